@@ -1,4 +1,4 @@
-// The list of passes a frame needs, computed from the request alone: no GL, no particle data.
+// The list of passes a frame needs, computed on the CPU from the request: no GL.
 #pragma once
 
 #include <optional>
@@ -10,6 +10,7 @@
 
 #include "absl/status/statusor.h"
 #include "renderer/image.h"
+#include "renderer/particle_view.h"
 #include "renderer/scene.h"
 
 namespace halflight {
@@ -31,10 +32,14 @@ struct Traversal {
   bool interpolate = false;
   SliceSpacing spacing = SliceSpacing::kEqualCount;
 
-  int light_buffer_size = 0;    // texels along each side; 0: no light buffer
-  int light_channels = 1;       // 3 only where blur treats the colours differently
+  int light_buffer_size = 0;          // texels along each side; 0: no light buffer
+  bool colored_light_buffer = false;  // three channels: only where blur treats them differently
   bool blur = false;
-  bool keep_layers = false;     // read the light buffer back after every slice
+  // What outputs show of this light: its transmittance at the particles that the eye sees, the
+  // light buffer behind the last slice, the light buffer after every slice.
+  bool keep_transmittance = false;
+  bool keep_light_buffer = false;
+  bool keep_layers = false;
 };
 
 struct PlannedPass {
@@ -44,16 +49,15 @@ struct PlannedPass {
 };
 
 struct FramePlan {
-  glm::ivec2 window_size{0};     // pixels of the image
-  glm::ivec2 composite_size{0};  // pixels composited, after super- or downsampling
-  bool depth_target = false;
-  std::optional<int> transmittance_light;  // the light whose transmittance target is needed
-  std::vector<Traversal> traversals;
-  std::vector<PlannedPass> passes;  // what the above comes to, for people
+  glm::ivec2 window_size{0};          // pixels of the image
+  glm::ivec2 composite_size{0};       // pixels composited, after super- or downsampling
+  bool keep_depth = false;            // an output shows it; drawn by the first traversal
+  std::vector<Traversal> traversals;  // at least one
+  std::vector<PlannedPass> passes;    // what the above comes to, for people
 };
 
-// Fails with InvalidArgument, naming the field, where the scene asks for what its technique
-// cannot do.
-absl::StatusOr<FramePlan> PlanFrame(const FrameRequest& request);
+// `particles` is the view of request.scene. Fails with InvalidArgument, naming the field, where the
+// scene asks for what its technique cannot do.
+absl::StatusOr<FramePlan> PlanFrame(const FrameRequest& request, const ParticleView& particles);
 
 }  // namespace halflight

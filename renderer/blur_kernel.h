@@ -1,0 +1,20 @@
+// Weights of the light's sideways spread. No GL.
+#pragma once
+
+#include <vector>
+
+namespace halflight {
+
+// The discrete Gaussian of Lindeberg 1990 ("Scale-space for discrete signals", eq. 19),
+// T(n, v) = exp(-v) I_n(v): weights by distance n >= 0 in texels, cut where the rest is below 1e-7
+// and normalised so that weight 0 plus twice the others is 1. Unlike a sampled Gaussian its
+// variance is exactly v however small v is, and two kernels applied in turn give exactly the one of
+// the summed variance: many small steps blur as one large one does. `variance` in squared texels,
+// at most kMaxBlurVariance.
+std::vector<float> DiscreteGaussian(double variance);
+
+// The kernel of this variance still fits into shader::kMaxBlurRadius; larger blurs take several
+// steps.
+inline constexpr double kMaxBlurVariance = 100.0;
+
+}  // namespace halflight

@@ -1,0 +1,30 @@
+// Turns what was drawn into the images that were asked for. Reads targets back; draws nothing.
+#pragma once
+
+#include "renderer/gl/object.h"
+#include "renderer/image.h"
+#include "renderer/scene.h"
+
+namespace halflight {
+
+// All four channels of a texture. Waits for the device.
+Image ReadTexture(const gl::Texture& texture);
+
+// R G B A += other, of the same size.
+void AddColors(const Image& other, Image& image);
+
+// The alpha channel of a composited image.
+Image CoverageOf(const Image& image);
+
+// Mean depth from a (depth * alpha, , , alpha) target: +infinity where alpha is 0.
+Image DepthOf(const Image& target);
+
+// Mean transmittance from a (R G B * alpha, alpha) target: 1 where alpha is 0. `colored`: three
+// channels instead of one.
+Image TransmittanceOf(const Image& target, bool colored);
+
+// Light buffers as read are optical depths; as asked, that or exp(-density * optical depth), with
+// three channels where the light's density is coloured.
+Image LightImage(const Image& optical_depth, LightQuantity quantity, const Light& light);
+
+}  // namespace halflight

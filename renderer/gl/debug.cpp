@@ -1,0 +1,18 @@
+#include "renderer/gl/debug.h"
+
+#include "absl/strings/str_cat.h"
+
+namespace halflight::gl {
+
+absl::Status CheckErrors(const char* where) {
+  const GLenum error = glGetError();
+  if (error == GL_NO_ERROR) return absl::OkStatus();
+  while (glGetError() != GL_NO_ERROR) {
+  }
+  if (error == GL_OUT_OF_MEMORY) {
+    return absl::ResourceExhaustedError(absl::StrCat(where, ": the device is out of memory"));
+  }
+  return absl::InternalError(absl::StrCat(where, ": GL error 0x", absl::Hex(error)));
+}
+
+}  // namespace halflight::gl

@@ -1,0 +1,65 @@
+#include "renderer/gl/object.h"
+
+#include <array>
+
+namespace halflight::gl {
+
+namespace {
+
+Buffer MakeImmutableBuffer(const char* label, size_t bytes, const void* contents) {
+  GLuint name = 0;
+  glCreateBuffers(1, &name);
+  // A buffer of no bytes cannot be made; an absent attribute still needs something to bind.
+  const size_t size = bytes == 0 ? sizeof(float) : bytes;
+  glNamedBufferStorage(name, static_cast<GLsizeiptr>(size), bytes == 0 ? nullptr : contents, 0);
+  glObjectLabel(GL_BUFFER, name, -1, label);
+  return Buffer(name);
+}
+
+}  // namespace
+
+Buffer MakeBuffer(const char* label, std::span<const std::byte> contents) {
+  return MakeImmutableBuffer(label, contents.size(), contents.data());
+}
+
+Buffer MakeBuffer(const char* label, size_t bytes) {
+  return MakeImmutableBuffer(label, bytes, nullptr);
+}
+
+namespace {
+
+GLuint CreateTexture(const TextureInfo& info) {
+  GLuint name = 0;
+  glCreateTextures(GL_TEXTURE_2D, 1, &name);
+  glTextureStorage2D(name, 1, info.format, info.width, info.height);
+  const GLint wrap = info.clamp_to_zero ? GL_CLAMP_TO_BORDER : GL_CLAMP_TO_EDGE;
+  glTextureParameteri(name, GL_TEXTURE_WRAP_S, wrap);
+  glTextureParameteri(name, GL_TEXTURE_WRAP_T, wrap);
+  glTextureParameteri(name, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
+  glTextureParameteri(name, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
+  glObjectLabel(GL_TEXTURE, name, -1, info.label);
+  return name;
+}
+
+}  // namespace
+
+Texture::Texture(const TextureInfo& info)
+    : Object(CreateTexture(info)), width_(info.width), height_(info.height) {}
+
+Framebuffer MakeFramebuffer(const char* label, std::initializer_list<const Texture*> colors) {
+  GLuint name = 0;
+  glCreateFramebuffers(1, &name);
+  std::vector<GLenum> draw_buffers;
+  for (const Texture* color : colors) {
+    const GLenum attachment = GL_COLOR_ATTACHMENT0 + static_cast<GLenum>(draw_buffers.size());
+    const bool present = color != nullptr && *color;
+    if (present) glNamedFramebufferTexture(name, attachment, color->name(), 0);
+    draw_buffers.push_back(present ? attachment : GL_NONE);
+  }
+  glNamedFramebufferDrawBuffers(name, static_cast<GLsizei>(draw_buffers.size()),
+                                draw_buffers.data());
+  glObjectLabel(GL_FRAMEBUFFER, name, -1, label);
+  return Framebuffer(name);
+}
+
+}  // namespace halflight::gl

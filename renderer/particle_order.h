@@ -1,0 +1,29 @@
+// The order in which a traversal meets the particles, and how it is cut into slices.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include <glm/vec3.hpp>
+
+#include "renderer/frame_plan.h"
+#include "renderer/particle_view.h"
+#include "shaders/bindings.h"
+
+namespace halflight {
+
+struct ParticleOrder {
+  std::vector<shader::OrderedParticle> particles;
+  // Slice s is particles [slice_begin[s], slice_begin[s + 1]); some may be empty.
+  std::vector<uint32_t> slice_begin;
+  // Where along the axis the middle of each slice lies: the mean of its particles; an empty slice
+  // lies where the one before it does. Empty for an order by distance.
+  std::vector<double> slice_position;
+};
+
+// Sorts by the traversal's axis, or by distance from the eye (`eye` is relative to the set's
+// origin), and cuts into the traversal's slices: every particle falls into exactly one.
+ParticleOrder OrderParticles(const ParticleView& particles, const Traversal& traversal,
+                             const glm::dvec3& eye);
+
+}  // namespace halflight

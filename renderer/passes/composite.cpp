@@ -1,0 +1,149 @@
+#include "renderer/passes/composite.h"
+
+#include <array>
+
+#include <glm/matrix.hpp>
+
+#include "renderer/gl/debug.h"
+#include "shaders/bindings.h"
+#include "spirv/composite.frag.h"
+#include "spirv/composite.vert.h"
+
+namespace halflight {
+
+namespace {
+
+const gl::ProgramSource& CompositeProgram() {
+  static const gl::ProgramSource source{
+      "composite",
+      {{GL_VERTEX_SHADER, spirv_composite_vert}, {GL_FRAGMENT_SHADER, spirv_composite_frag}}};
+  return source;
+}
+
+shader::LightBlock DescribeLight(const Light& light, const glm::dmat4& view_from_world) {
+  shader::LightBlock block;
+  block.color = glm::vec4(light.color, 0.0F);
+  block.density = glm::vec4(light.shadow_density, 0.0F);
+  if (const auto* directional = std::get_if<DirectionalLight>(&light.kind)) {
+    block.vector = glm::vec4(glm::dmat3(view_from_world) * directional->direction, 0.0F);
+  } else {
+    const auto& point = std::get<PointLight>(light.kind);
+    block.vector = view_from_world * glm::dvec4(point.position, 1.0);
+    block.color.w = point.inverse_square_falloff ? 1.0F : 0.0F;
+  }
+  return block;
+}
+
+shader::CompositeBlock DescribeComposite(const Scene& scene, const Traversal& traversal,
+                                         const Projection& eye, const Projection* light) {
+  const Material& material = scene.material;
+  shader::CompositeBlock block{};
+  block.albedo = glm::vec4(material.albedo, material.phase_g);
+  if (traversal.ambient_and_emission) {
+    block.ambient = glm::vec4(material.ambient, 0.0F);
+    block.emission = glm::vec4(material.emission, 0.0F);
+  }
+  if (light != nullptr) {
+    const glm::dmat3 rotation =
+        glm::dmat3(light->view_from_world) * glm::transpose(glm::dmat3(eye.view_from_world));
+    block.light_view_from_view = glm::mat4(glm::mat3(rotation));
+    const glm::dvec2 size(light->size);
+    block.light_texture_from_plane =
+        glm::vec4(light->pixel_from_plane / size, light->pixel_offset / size);
+  }
+  std::vector<int> lights = traversal.unshadowed_lights;
+  if (traversal.shadow_light) lights.insert(lights.begin(), *traversal.shadow_light);
+  for (size_t i = 0; i < lights.size() && i < shader::kMaxLightsInTraversal; ++i) {
+    block.lights[i] =
+        DescribeLight(scene.lights[static_cast<size_t>(lights[i])], eye.view_from_world);
+    block.light_count.x = static_cast<uint32_t>(i) + 1;
+  }
+  return block;
+}
+
+}  // namespace
+
+CompositeTarget MakeCompositeTarget(const glm::ivec2& size, bool depth, bool transmittance) {
+  CompositeTarget target;
+  const gl::TextureInfo info{
+      .label = "image", .format = GL_RGBA32F, .width = size.x, .height = size.y};
+  target.image = gl::Texture(info);
+  if (depth) target.depth = gl::Texture(info);
+  if (transmittance) target.transmittance = gl::Texture(info);
+  target.framebuffer =
+      gl::MakeFramebuffer("composite", {&target.image, &target.depth, &target.transmittance});
+  constexpr std::array<float, 4> kZero = {};
+  for (GLint i = 0; i < 3; ++i) {
+    glClearNamedFramebufferfv(target.framebuffer.name(), GL_COLOR, i, kZero.data());
+  }
+  return target;
+}
+
+CompositePass PrepareComposite(const Scene& scene, const Traversal& traversal,
+                               const OrderBuffers& order, const ParticleBuffers& particles,
+                               const TargetProjection& eye, const gl::Buffer& eye_splats,
+                               const TargetProjection* light, const gl::Buffer* light_splats,
+                               const CompositeTarget& target) {
+  const bool point_light = light != nullptr && !light->projection.orthographic;
+  return {
+      .order = order,
+      .particles = particles,
+      .eye = eye,
+      .eye_splats = eye_splats,
+      .light_splats = light_splats,
+      .uniforms = gl::MakeBlock("composite",
+                                DescribeComposite(scene, traversal, eye.projection,
+                                                  light != nullptr ? &light->projection : nullptr)),
+      .constants =
+          {
+              {shader::kOrthographicConstant, eye.projection.orthographic},
+              {shader::kBallProfileConstant, scene.material.profile == Profile::kBall},
+              {shader::kHasColorsConstant, particles.has_colors},
+              // Emission belongs to one traversal only.
+              {shader::kHasEmissionsConstant,
+               particles.has_emissions && traversal.ambient_and_emission},
+              {shader::kShadowedConstant, light != nullptr},
+              {shader::kPointShadowLightConstant, point_light},
+              {shader::kInterpolateConstant, traversal.interpolate},
+              {shader::kColoredLightBufferConstant, traversal.colored_light_buffer},
+              {shader::kPhaseConstant, scene.material.phase_g != 0.0F},
+              {shader::kDepthOutputConstant, static_cast<bool>(target.depth)},
+              {shader::kTransmittanceOutputConstant, static_cast<bool>(target.transmittance)},
+          },
+      .back_to_front = traversal.back_to_front,
+  };
+}
+
+absl::Status CompositeSlice(Gpu& gpu, const CompositePass& pass, uint32_t begin, uint32_t end,
+                            const SliceLight* light, const CompositeTarget& target) {
+  const gl::DebugScope scope("composite slice");
+  const absl::StatusOr<GLuint> program = gpu.programs.Get(CompositeProgram(), pass.constants);
+  if (!program.ok()) return program.status();
+  glBindFramebuffer(GL_FRAMEBUFFER, target.framebuffer.name());
+  glViewport(0, 0, target.image.width(), target.image.height());
+  glEnable(GL_BLEND);
+  glBlendEquation(GL_FUNC_ADD);
+  if (pass.back_to_front) {
+    glBlendFunc(GL_ONE, GL_ONE_MINUS_SRC_ALPHA);
+  } else {
+    glBlendFunc(GL_ONE_MINUS_DST_ALPHA, GL_ONE);
+  }
+  glUseProgram(*program);
+  glBindBufferBase(GL_UNIFORM_BUFFER, shader::kProjectionBinding, pass.eye.block.name());
+  glBindBufferBase(GL_UNIFORM_BUFFER, shader::kCompositeBinding, pass.uniforms.name());
+  glBindBufferBase(GL_SHADER_STORAGE_BUFFER, shader::kOrderBinding, pass.order.order.name());
+  glBindBufferBase(GL_SHADER_STORAGE_BUFFER, shader::kColorsBinding, pass.particles.colors.name());
+  glBindBufferBase(GL_SHADER_STORAGE_BUFFER, shader::kEmissionsBinding,
+                   pass.particles.emissions.name());
+  glBindBufferBase(GL_SHADER_STORAGE_BUFFER, shader::kSplatsBinding, pass.eye_splats.name());
+  if (light != nullptr) {
+    glBindBufferBase(GL_SHADER_STORAGE_BUFFER, shader::kLightSplatsBinding,
+                     pass.light_splats->name());
+    glBindTextureUnit(shader::kLightBeforeBinding, light->before.texture.name());
+    glBindTextureUnit(shader::kLightAfterBinding, light->after.texture.name());
+  }
+  DrawQuads(gpu, pass.order, begin, end);
+  return absl::OkStatus();
+}
+
+}  // namespace halflight

@@ -1,0 +1,54 @@
+// The eye pass: particles over the image, in the traversal's order.
+#pragma once
+
+#include <optional>
+
+#include "absl/status/status.h"
+#include "renderer/frame_plan.h"
+#include "renderer/gpu.h"
+#include "renderer/passes/light_buffer.h"
+#include "renderer/passes/project.h"
+
+namespace halflight {
+
+// What a traversal draws into; depth and transmittance only where an output shows them.
+struct CompositeTarget {
+  gl::Texture image;          // premultiplied R G B A
+  gl::Texture depth;          // depth * alpha, alpha in A
+  gl::Texture transmittance;  // R G B * alpha, alpha
+  gl::Framebuffer framebuffer;
+};
+
+// Cleared to nothing covered.
+CompositeTarget MakeCompositeTarget(const glm::ivec2& size, bool depth, bool transmittance);
+
+// The light buffers that a slice sees.
+struct SliceLight {
+  const LightBuffer& before;  // without the slice
+  const LightBuffer& after;   // with it; read only when interpolating
+};
+
+// Everything about a traversal that stays the same from slice to slice.
+struct CompositePass {
+  const OrderBuffers& order;
+  const ParticleBuffers& particles;
+  const TargetProjection& eye;
+  const gl::Buffer& eye_splats;
+  const gl::Buffer* light_splats;  // null: no shadows
+  gl::Buffer uniforms;             // shader::CompositeBlock
+  gl::Constants constants;
+  bool back_to_front;
+};
+
+// `light` and `light_splats` are those of traversal.shadow_light, null without.
+CompositePass PrepareComposite(const Scene& scene, const Traversal& traversal,
+                               const OrderBuffers& order, const ParticleBuffers& particles,
+                               const TargetProjection& eye, const gl::Buffer& eye_splats,
+                               const TargetProjection* light, const gl::Buffer* light_splats,
+                               const CompositeTarget& target);
+
+// Draws particles [begin, end) of the order over `target`; `light` is null without shadows.
+absl::Status CompositeSlice(Gpu& gpu, const CompositePass& pass, uint32_t begin, uint32_t end,
+                            const SliceLight* light, const CompositeTarget& target);
+
+}  // namespace halflight

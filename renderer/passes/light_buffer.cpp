@@ -1,0 +1,138 @@
+#include "renderer/passes/light_buffer.h"
+
+#include <array>
+#include <cmath>
+
+#include "renderer/blur_kernel.h"
+#include "renderer/gl/debug.h"
+#include "shaders/bindings.h"
+#include "spirv/blur.frag.h"
+#include "spirv/deposit.frag.h"
+#include "spirv/deposit.vert.h"
+#include "spirv/fullscreen.vert.h"
+
+namespace halflight {
+
+namespace {
+
+const gl::ProgramSource& DepositProgram() {
+  static const gl::ProgramSource source{
+      "deposit",
+      {{GL_VERTEX_SHADER, spirv_deposit_vert}, {GL_FRAGMENT_SHADER, spirv_deposit_frag}}};
+  return source;
+}
+
+const gl::ProgramSource& BlurProgram() {
+  static const gl::ProgramSource source{
+      "blur", {{GL_VERTEX_SHADER, spirv_fullscreen_vert}, {GL_FRAGMENT_SHADER, spirv_blur_frag}}};
+  return source;
+}
+
+absl::Status BlurAlongAxis(Gpu& gpu, const LightBuffer& from, const LightBuffer& to,
+                           const glm::uvec2& axis, double variance, const glm::vec3& density,
+                           bool colored) {
+  const absl::StatusOr<GLuint> program =
+      gpu.programs.Get(BlurProgram(), {{shader::kColoredLightBufferConstant, colored}});
+  if (!program.ok()) return program.status();
+  const std::vector<float> weights = DiscreteGaussian(variance);
+  shader::BlurBlock block{};
+  block.axis = {axis, static_cast<uint32_t>(weights.size()) - 1, 0U};
+  block.density = glm::vec4(density, 0.0F);
+  for (size_t n = 0; n < weights.size(); ++n) {
+    block.weights[n / 4][static_cast<glm::length_t>(n % 4)] = weights[n];
+  }
+  const gl::Buffer uniforms = gl::MakeBlock("blur", block);
+
+  glBindFramebuffer(GL_FRAMEBUFFER, to.framebuffer.name());
+  glViewport(0, 0, to.texture.width(), to.texture.height());
+  glDisable(GL_BLEND);
+  glUseProgram(*program);
+  glBindBufferBase(GL_UNIFORM_BUFFER, shader::kBlurBinding, uniforms.name());
+  glBindTextureUnit(shader::kSourceBinding, from.texture.name());
+  DrawFullscreen(gpu);
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+LightBuffer MakeLightBuffer(const char* label, int size, bool colored) {
+  LightBuffer buffer;
+  // Three channels live in four: drawing into RGB32F is not required of drivers.
+  buffer.texture = gl::Texture({.label = label,
+                                .format = static_cast<GLenum>(colored ? GL_RGBA32F : GL_R32F),
+                                .width = size,
+                                .height = size,
+                                .clamp_to_zero = true});
+  buffer.framebuffer = gl::MakeFramebuffer(label, {&buffer.texture});
+  constexpr std::array<float, 4> kZero = {};
+  glClearNamedFramebufferfv(buffer.framebuffer.name(), GL_COLOR, 0, kZero.data());
+  return buffer;
+}
+
+absl::Status DepositSlice(Gpu& gpu, const OrderBuffers& order, const gl::Buffer& light_splats,
+                          const TargetProjection& light, Profile profile, uint32_t begin,
+                          uint32_t end, const LightBuffer& target) {
+  const gl::DebugScope scope("deposit slice into light buffer");
+  const absl::StatusOr<GLuint> program = gpu.programs.Get(
+      DepositProgram(), {
+                            {shader::kOrthographicConstant, light.projection.orthographic},
+                            {shader::kBallProfileConstant, profile == Profile::kBall},
+                        });
+  if (!program.ok()) return program.status();
+  glBindFramebuffer(GL_FRAMEBUFFER, target.framebuffer.name());
+  glViewport(0, 0, target.texture.width(), target.texture.height());
+  glEnable(GL_BLEND);
+  glBlendEquation(GL_FUNC_ADD);
+  glBlendFunc(GL_ONE, GL_ONE);
+  glUseProgram(*program);
+  glBindBufferBase(GL_UNIFORM_BUFFER, shader::kProjectionBinding, light.block.name());
+  glBindBufferBase(GL_SHADER_STORAGE_BUFFER, shader::kLightSplatsBinding, light_splats.name());
+  DrawQuads(gpu, order, begin, end);
+  return absl::OkStatus();
+}
+
+void CopyLightBuffer(const LightBuffer& from, const LightBuffer& to) {
+  glCopyImageSubData(from.texture.name(), GL_TEXTURE_2D, 0, 0, 0, 0, to.texture.name(),
+                     GL_TEXTURE_2D, 0, 0, 0, 0, from.texture.width(), from.texture.height(), 1);
+}
+
+absl::Status BlurLightBuffer(Gpu& gpu, const LightBuffer& buffer, const LightBuffer& scratch,
+                             const glm::dvec2& variance, const glm::vec3& density, bool colored) {
+  const gl::DebugScope scope("blur light buffer");
+  // Kernels of variances v1 and v2 in turn are the kernel of v1 + v2, so a wide one is taken in
+  // equal steps.
+  const double steps =
+      std::max(1.0, std::ceil(std::max(variance.x, variance.y) / kMaxBlurVariance));
+  for (double step = 0.0; step < steps; ++step) {
+    if (absl::Status status =
+            BlurAlongAxis(gpu, buffer, scratch, {1, 0}, variance.x / steps, density, colored);
+        !status.ok()) {
+      return status;
+    }
+    if (absl::Status status =
+            BlurAlongAxis(gpu, scratch, buffer, {0, 1}, variance.y / steps, density, colored);
+        !status.ok()) {
+      return status;
+    }
+  }
+  return absl::OkStatus();
+}
+
+Image ReadLightBuffer(const LightBuffer& buffer, bool colored) {
+  Image image;
+  image.width = buffer.texture.width();
+  image.height = buffer.texture.height();
+  if (colored) {
+    image.channels = {"R", "G", "B"};
+  } else {
+    image.channels = {"Y"};
+  }
+  image.pixels.resize(static_cast<size_t>(image.width) * static_cast<size_t>(image.height) *
+                      image.channels.size());
+  glPixelStorei(GL_PACK_ALIGNMENT, 1);
+  glGetTextureImage(buffer.texture.name(), 0, colored ? GL_RGB : GL_RED, GL_FLOAT,
+                    static_cast<GLsizei>(image.pixels.size() * sizeof(float)), image.pixels.data());
+  return image;
+}
+
+}  // namespace halflight

@@ -1,0 +1,38 @@
+// The light buffer of one light, and the passes that write it.
+#pragma once
+
+#include <vector>
+
+#include "absl/status/status.h"
+#include "renderer/gpu.h"
+#include "renderer/image.h"
+#include "renderer/passes/project.h"
+#include "renderer/scene.h"
+
+namespace halflight {
+
+// A texture of optical depth, seen from the light, with the framebuffer that draws into it.
+struct LightBuffer {
+  gl::Texture texture;
+  gl::Framebuffer framebuffer;
+};
+
+// Zeroed. `colored`: three channels (stored in four) instead of one.
+LightBuffer MakeLightBuffer(const char* label, int size, bool colored);
+
+// Adds particles [begin, end) of the order to `target`. `light` is the projection of the splats.
+absl::Status DepositSlice(Gpu& gpu, const OrderBuffers& order, const gl::Buffer& light_splats,
+                          const TargetProjection& light, Profile profile, uint32_t begin,
+                          uint32_t end, const LightBuffer& target);
+
+void CopyLightBuffer(const LightBuffer& from, const LightBuffer& to);
+
+// Spreads the light in `buffer` sideways by these variances along x and y, in squared texels;
+// `density` is the light's shadow density and `scratch` a buffer of the same size.
+absl::Status BlurLightBuffer(Gpu& gpu, const LightBuffer& buffer, const LightBuffer& scratch,
+                             const glm::dvec2& variance, const glm::vec3& density, bool colored);
+
+// The optical depth as it stands; one or three channels. Waits for the device.
+Image ReadLightBuffer(const LightBuffer& buffer, bool colored);
+
+}  // namespace halflight

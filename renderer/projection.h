@@ -1,0 +1,46 @@
+// Projections onto a target's pixels, the eye's and the lights', built in float64 and rebased to
+// the particle set. See ProjectionBlock in shaders/bindings.h for "plane" and pixel coordinates.
+#pragma once
+
+#include <glm/mat4x4.hpp>
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
+
+#include "renderer/particle_view.h"
+#include "renderer/scene.h"
+#include "shaders/bindings.h"
+
+namespace halflight {
+
+struct Projection {
+  glm::dmat4 view_from_world{1.0};  // rigid; x right, y up, looking along -z
+  bool orthographic = false;
+  glm::ivec2 size{1};              // target, pixels
+  glm::dvec2 pixel_from_plane{1};  // scale
+  glm::dvec2 pixel_offset{0};      // pixel = plane * pixel_from_plane + pixel_offset
+  double least_radius = 0.0;       // plane units; smaller particles are drawn as large as this
+
+  // Maps world points to target coordinates: after division by w, (0, 0) is the outer corner of the
+  // top left pixel and (1, 1) that of the bottom right one.
+  [[nodiscard]] glm::dmat4 texture_from_world() const;
+  // Position of the eye (or light) in the world.
+  [[nodiscard]] glm::dvec3 eye() const;
+  // The uniform block, for a set with this origin.
+  [[nodiscard]] shader::ProjectionBlock block(const glm::dvec3& set_origin) const;
+};
+
+// The eye's projection onto a target that samples the camera's window with `samples` samples a
+// pixel along each side (below 1: fewer samples than pixels).
+Projection EyeProjection(const Camera& camera, const glm::ivec2& target_size, double samples);
+
+// A projection from a light onto a square light buffer, fitted to the particles: shows all of each
+// of them and leaves only the border that filtering needs. `spread` widens the border by that many
+// world units for light that scatters sideways. A point light must lie outside the particles.
+Projection LightProjection(const Light& light, const ParticleView& particles, int size,
+                           double spread);
+
+// The direction in which light travels at the particles: towards the centre of their bounds for a
+// point light. Unit length.
+glm::dvec3 TravelDirection(const Light& light, const ParticleView& particles);
+
+}  // namespace halflight

@@ -1,0 +1,19 @@
+// Orders particles along an axis or by distance. Keeps no state.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+namespace halflight {
+
+// Maps a float to an unsigned integer of the same order. -0 and +0 get the same key; NaN must not
+// come in.
+uint32_t OrderedKey(float value);
+
+// The permutation that sorts `keys` ascending: result[k] is the index of the k-th smallest. Stable
+// (equal keys keep the order of their indices), so the same input gives the same output on any
+// number of cores. Least-significant-digit radix sort, 11 bits a digit.
+std::vector<uint32_t> SortedOrder(std::span<const uint32_t> keys);
+
+}  // namespace halflight

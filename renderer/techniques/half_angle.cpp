@@ -1,0 +1,210 @@
+#include "renderer/techniques/half_angle.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <glm/geometric.hpp>
+#include <glm/gtc/matrix_access.hpp>
+
+#include "absl/strings/str_cat.h"
+#include "renderer/frame.h"
+#include "renderer/traversal_context.h"
+
+namespace halflight {
+
+namespace {
+
+glm::dvec3 ViewDirection(const Camera& camera) {
+  return -glm::normalize(glm::dvec3(glm::row(camera.view_from_world, 2)));
+}
+
+bool Scatters(const Scene& scene) {
+  return scene.shadow.blur_mode == BlurMode::kTexelsPerSlice
+             ? scene.shadow.blur_texels > 0.0F
+             : scene.material.scattering_spread > 0.0F;
+}
+
+// World units by which light that crosses the whole cloud has spread sideways, thrice the standard
+// deviation; never so much that the cloud itself shrinks to nothing in the light buffer.
+double BorderForSpread(const TraversalContext& context) {
+  if (!context.traversal.blur || context.scene.shadow.blur_mode != BlurMode::kDistance) return 0.0;
+  const OffsetBounds& bounds = context.particles.bounds();
+  const double diameter = glm::distance(bounds.low, bounds.high);
+  return std::min(3.0 * context.scene.material.scattering_spread * std::sqrt(diameter),
+                  0.25 * diameter);
+}
+
+// Squared texels along x and y by which light spreads between the middles of two slices that lie
+// `distance` (world units along the light) apart.
+glm::dvec2 BlurVariance(const TraversalContext& context, const Projection& light, double distance) {
+  if (context.scene.shadow.blur_mode == BlurMode::kTexelsPerSlice) {
+    const double texels = context.scene.shadow.blur_texels;
+    return glm::dvec2(texels * texels);
+  }
+  const double spread = context.scene.material.scattering_spread;
+  glm::dvec2 texels_per_unit = glm::abs(light.pixel_from_plane);
+  if (!light.orthographic) {
+    const glm::dvec3 center = context.particles.set().origin + context.particles.bounds().center();
+    texels_per_unit /= glm::distance(center, light.eye());
+  }
+  return spread * spread * distance * texels_per_unit * texels_per_unit;
+}
+
+// The light buffers of a traversal. `before` holds what the slices so far left; `after` also the
+// current slice, and `scratch` is the blur's; neither exists unless it is needed.
+struct LightBuffers {
+  LightBuffer before;
+  LightBuffer after;
+  LightBuffer scratch;
+
+  explicit LightBuffers(const Traversal& traversal) {
+    const int size = traversal.light_buffer_size;
+    const bool colored = traversal.colored_light_buffer;
+    before = MakeLightBuffer("light buffer", size, colored);
+    if (traversal.interpolate) after = MakeLightBuffer("light buffer, next", size, colored);
+    if (traversal.blur) scratch = MakeLightBuffer("light buffer, blur", size, colored);
+  }
+};
+
+void AppendLayer(Image layer, Image& layers) {
+  if (layers.pixels.empty()) {
+    layers = std::move(layer);
+    return;
+  }
+  layers.pixels.insert(layers.pixels.end(), layer.pixels.begin(), layer.pixels.end());
+  ++layers.layers;
+}
+
+}  // namespace
+
+HalfAngleAxis ComputeHalfAngleAxis(const glm::dvec3& view, const glm::dvec3& light) {
+  if (glm::dot(view, light) > 0.0) return {glm::normalize(view + light), false};
+  return {glm::normalize(light - view), true};
+}
+
+absl::StatusOr<Traversal> HalfAngle::PlanLight(const Scene& scene, const ParticleView& particles,
+                                               int light) const {
+  const Light& source = scene.lights[static_cast<size_t>(light)];
+  const HalfAngleAxis half_angle =
+      ComputeHalfAngleAxis(ViewDirection(scene.camera), TravelDirection(source, particles));
+  Traversal traversal;
+  traversal.axis = half_angle.axis;
+  traversal.back_to_front = half_angle.back_to_front;
+  traversal.slices = static_cast<int>(
+      std::clamp<size_t>(particles.size(), 1, static_cast<size_t>(scene.shadow.slices)));
+  traversal.interpolate = scene.shadow.interpolate;
+  traversal.spacing = scene.shadow.spacing;
+  traversal.light_buffer_size = scene.shadow.light_buffer_size;
+  traversal.blur = Scatters(scene);
+  traversal.colored_light_buffer = traversal.blur && source.colored_density();
+  return traversal;
+}
+
+std::vector<PlannedPass> HalfAngle::DescribePasses(const Traversal& traversal) const {
+  const std::string light = absl::StrCat("light ", *traversal.shadow_light, " casts shadows");
+  const int slices = traversal.slices;
+  std::vector<PlannedPass> passes = {
+      {traversal.back_to_front ? "sort along the half vector, back to front"
+                               : "sort along the half vector, front to back",
+       light, 1},
+      {"project particles for the eye", "every traversal", 1},
+      {"project particles for the light", light, 1},
+  };
+  if (traversal.blur) passes.push_back({"blur light buffer", "the light scatters", slices - 1});
+  if (traversal.interpolate) {
+    passes.push_back({"copy light buffer", "interpolation within slices", slices});
+  }
+  passes.push_back({"deposit slice into light buffer", light, slices});
+  passes.push_back({"composite slice", "the image", slices});
+  if (traversal.keep_layers) passes.push_back({"read back layer", "light layers wanted", slices});
+  return passes;
+}
+
+absl::StatusOr<ShadowResult> HalfAngle::Draw(const TraversalContext& context,
+                                             LightReport& report) const {
+  const Traversal& traversal = context.traversal;
+  const Light& source = context.scene.lights[static_cast<size_t>(*traversal.shadow_light)];
+  Gpu& gpu = context.gpu;
+
+  // Sort the particles along the axis, and fit the light's camera to them.
+  context.clock.BeginCpu("sort");
+  const ParticleOrder order = OrderParticles(
+      context.particles, traversal, context.eye.projection.eye() - context.particles.set().origin);
+  context.clock.BeginCpu("light camera");
+  const Projection light_projection = LightProjection(
+      source, context.particles, traversal.light_buffer_size, BorderForSpread(context));
+  const double light_along_axis =
+      glm::dot(TravelDirection(source, context.particles), *traversal.axis);
+  report.casts_shadows = true;
+  report.light_texture_from_world = light_projection.texture_from_world();
+  report.light_view_from_world = light_projection.view_from_world;
+  report.slice_axis = *traversal.axis;
+  report.slices = traversal.slices;
+  report.back_to_front = traversal.back_to_front;
+
+  // Project them for the eye and for the light.
+  context.clock.BeginGpu("project");
+  const OrderBuffers order_buffers = UploadOrder(order);
+  const TargetProjection light = UploadProjection(light_projection, context.particles);
+  absl::StatusOr<gl::Buffer> eye_splats = ProjectParticles(
+      gpu, context.buffers, order_buffers, context.eye, "project particles for the eye");
+  if (!eye_splats.ok()) return eye_splats.status();
+  absl::StatusOr<gl::Buffer> light_splats = ProjectParticles(
+      gpu, context.buffers, order_buffers, light, "project particles for the light");
+  if (!light_splats.ok()) return light_splats.status();
+
+  // Slice by slice: let the light spread up to the slice, deposit the slice, draw it.
+  context.clock.BeginGpu("light and composite");
+  LightBuffers buffers(traversal);
+  const CompositePass composite =
+      PrepareComposite(context.scene, traversal, order_buffers, context.buffers, context.eye,
+                       *eye_splats, &light, &*light_splats, context.target);
+  ShadowResult result;
+  for (size_t s = 0; s + 1 < order.slice_begin.size(); ++s) {
+    if (context.stop.stop_requested()) return absl::CancelledError("frame cancelled");
+    const uint32_t begin = order.slice_begin[s];
+    const uint32_t end = order.slice_begin[s + 1];
+    if (traversal.blur && s > 0) {
+      const double distance =
+          (order.slice_position[s] - order.slice_position[s - 1]) / light_along_axis;
+      if (absl::Status status =
+              BlurLightBuffer(gpu, buffers.before, buffers.scratch,
+                              BlurVariance(context, light_projection, distance),
+                              source.shadow_density, traversal.colored_light_buffer);
+          !status.ok()) {
+        return status;
+      }
+    }
+    LightBuffer& deposit_into = traversal.interpolate ? buffers.after : buffers.before;
+    const auto deposit = [&] {
+      return DepositSlice(gpu, order_buffers, *light_splats, light, context.scene.material.profile,
+                          begin, end, deposit_into);
+    };
+    const auto draw = [&] {
+      const SliceLight slice_light{buffers.before, deposit_into};
+      return CompositeSlice(gpu, composite, begin, end, &slice_light, context.target);
+    };
+    // Plain slicing sees the light without its own slice, interpolation the light on both sides.
+    absl::Status status;
+    if (traversal.interpolate) {
+      CopyLightBuffer(buffers.before, buffers.after);
+      status = deposit();
+      status.Update(draw());
+      std::swap(buffers.before, buffers.after);
+    } else {
+      status = draw();
+      status.Update(deposit());
+    }
+    if (!status.ok()) return status;
+    if (traversal.keep_layers) {
+      AppendLayer(ReadLightBuffer(buffers.before, traversal.colored_light_buffer),
+                  result.light_layers);
+    }
+  }
+  if (traversal.keep_light_buffer) {
+    result.light_buffer = ReadLightBuffer(buffers.before, traversal.colored_light_buffer);
+  }
+  return result;
+}
+
+}  // namespace halflight

@@ -1,0 +1,63 @@
+// How a ray meets a particle: the image model's impact parameter, well conditioned at any distance.
+// The same functions serve eye rays and light rays. Included after bindings.h.
+
+layout(constant_id = kOrthographicConstant) const bool kOrthographic = false;
+layout(constant_id = kBallProfileConstant) const bool kBallProfile = false;
+
+layout(std140, binding = kProjectionBinding) uniform Projections { ProjectionBlock projection; };
+
+// Where a ray passes a particle.
+struct Encounter {
+  float rho_squared;  // squared impact parameter over squared radius
+  vec3 offset;        // from the particle's centre to the ray's closest point, view axes
+  vec3 ray;           // along the ray, away from the eye; view axes, not normalised
+  bool in_front;      // of the eye
+};
+
+vec2 PlaneFromPixel(vec2 pixel) {
+  return pixel * projection.plane_from_pixel.xy + projection.plane_from_pixel.zw;
+}
+
+// With D = (plane, -1) the ray and o = w (c, -1) the centre, o x D = w ((c, -1) x (plane - c, 0)):
+// built from the offset to the centre, never from two large numbers.
+Encounter MeetParticle(vec2 pixel, vec4 center, bool general) {
+  Encounter e;
+  vec2 plane = PlaneFromPixel(pixel);
+  vec2 delta = plane - center.xy;
+  e.in_front = true;
+  if (kOrthographic) {
+    e.ray = vec3(0.0, 0.0, -1.0);
+    e.offset = vec3(delta, 0.0);
+    e.rho_squared = dot(delta, delta) / (center.w * center.w);
+    return e;
+  }
+  e.ray = vec3(plane, -1.0);
+  vec3 moment = center.z * vec3(delta.y, -delta.x, center.x * delta.y - center.y * delta.x);
+  if (general) {
+    moment = cross(center.xyz, e.ray);
+    e.in_front = dot(center.xyz, e.ray) > 0.0;
+  }
+  float inverse_length_squared = 1.0 / dot(e.ray, e.ray);
+  e.rho_squared =
+      dot(moment, moment) * inverse_length_squared / (center.w * center.w);
+  e.offset = cross(moment, e.ray) * inverse_length_squared;
+  return e;
+}
+
+// Optical depth relative to the centre's.
+float ProfileWeight(float rho_squared) {
+  float w = max(1.0 - rho_squared, 0.0);
+  return kBallProfile ? sqrt(w) : w;
+}
+
+// 1 - exp(-x), accurate for small x too, where the plain difference keeps no digits.
+float OpacityFromOpticalDepth(float x) {
+  float series = x * (1.0 - x * (0.5 - x * (1.0 / 6.0 - x * (1.0 / 24.0 - x * (1.0 / 120.0)))));
+  return x < 0.125 ? series : 1.0 - exp(-x);
+}
+
+// Corner 0 to 3 of a splat's rectangle in clip space. Target row 0 is at y = -1.
+vec4 RectCorner(vec4 rect, int corner) {
+  vec2 pixel = vec2((corner & 1) == 0 ? rect.x : rect.z, (corner & 2) == 0 ? rect.y : rect.w);
+  return vec4(pixel / projection.target_size.xy * 2.0 - 1.0, 0.0, 1.0);
+}
