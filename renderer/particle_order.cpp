@@ -87,6 +87,7 @@ ParticleOrder OrderParticles(const ParticleView& particles, const Traversal& tra
   order.particles = PlaceInSlices(sorted, order.slice_begin);
   if (traversal.axis) {
     order.slice_position.resize(slices);
+    if (count > 0) order.end_position = coordinate[sorted.back()];
     for (size_t s = 0; s < slices; ++s) {
       const uint32_t begin = order.slice_begin[s];
       const uint32_t end = order.slice_begin[s + 1];

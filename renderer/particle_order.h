@@ -19,6 +19,7 @@ struct ParticleOrder {
   // Where along the axis the middle of each slice lies: the mean of its particles; an empty slice
   // lies where the one before it does. Empty for an order by distance.
   std::vector<double> slice_position;
+  double end_position = 0.0;  // of the last particle along the axis
 };
 
 // Sorts by the traversal's axis, or by distance from the eye (`eye` is relative to the set's

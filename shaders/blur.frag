@@ -1,12 +1,16 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
 // One axis of the light's spread between two slices. Light spreads, not optical depth, so the
-// kernel weighs transmittance; the buffer stays in optical depth:
+// kernel weighs transmittance; the buffer stays in optical depth, so that deep shadows do not
+// underflow and faint ones do not drown in the rounding of 1 - D:
 //   D' = m - log(sum of weight * exp(-density (D - m))) / density,   m = least D under the kernel
 // Beyond the buffer light is unattenuated. Blending: off.
 #include "bindings.h"
+#include "opacity.glsl"
 
 layout(constant_id = kColoredLightBufferConstant) const bool kColoredLightBuffer = false;
+
+const int kChannels = kColoredLightBuffer ? 3 : 1;
 
 layout(std140, binding = kBlurBinding) uniform Blur { BlurBlock blur; };
 layout(binding = kSourceBinding) uniform sampler2D source;
@@ -27,11 +31,24 @@ void main() {
   vec3 centre = least;
   for (int d = 1; d <= radius; ++d) least = min(least, min(Fetch(d), Fetch(-d)));
 
-  vec3 sum = vec3(0.0);
+  // Light kept and light lost: which of the two has the digits depends on the shadow's depth.
+  vec3 kept = vec3(0.0);
+  vec3 lost = vec3(0.0);
   for (int d = -radius; d <= radius; ++d) {
     float weight = blur.weights[abs(d) >> 2][abs(d) & 3];
-    sum += weight * exp(-blur.density.rgb * (Fetch(d) - least));
+    vec3 depth = blur.density.rgb * (Fetch(d) - least);
+    for (int c = 0; c < kChannels; ++c) {
+      float opacity = OpacityFromOpticalDepth(depth[c]);
+      lost[c] += weight * opacity;
+      kept[c] += weight * (depth[c] < 1.0 ? 1.0 - opacity : exp(-depth[c]));
+    }
   }
-  vec3 result = least - log(sum) / max(blur.density.rgb, 1e-30);
-  blurred = vec4(mix(centre, max(result, 0.0), greaterThan(blur.density.rgb, vec3(0.0))), 0.0);
+  blurred = vec4(0.0);
+  for (int c = 0; c < kChannels; ++c) {
+    float density = blur.density[c];
+    // A colour that nothing attenuates needs no spreading.
+    blurred[c] = density > 0.0
+                     ? least[c] + OpticalDepthFromOpacity(lost[c], kept[c]) / density
+                     : centre[c];
+  }
 }

@@ -1,5 +1,6 @@
 // How a ray meets a particle: the image model's impact parameter, well conditioned at any distance.
 // The same functions serve eye rays and light rays. Included after bindings.h.
+#include "opacity.glsl"
 
 layout(constant_id = kOrthographicConstant) const bool kOrthographic = false;
 layout(constant_id = kBallProfileConstant) const bool kBallProfile = false;
@@ -48,12 +49,6 @@ Encounter MeetParticle(vec2 pixel, vec4 center, bool general) {
 float ProfileWeight(float rho_squared) {
   float w = max(1.0 - rho_squared, 0.0);
   return kBallProfile ? sqrt(w) : w;
-}
-
-// 1 - exp(-x), accurate for small x too, where the plain difference keeps no digits.
-float OpacityFromOpticalDepth(float x) {
-  float series = x * (1.0 - x * (0.5 - x * (1.0 / 6.0 - x * (1.0 / 24.0 - x * (1.0 / 120.0)))));
-  return x < 0.125 ? series : 1.0 - exp(-x);
 }
 
 // Corner 0 to 3 of a splat's rectangle in clip space. Target row 0 is at y = -1.

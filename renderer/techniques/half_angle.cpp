@@ -159,21 +159,20 @@ absl::StatusOr<ShadowResult> HalfAngle::Draw(const TraversalContext& context,
   const CompositePass composite =
       PrepareComposite(context.scene, traversal, order_buffers, context.buffers, context.eye,
                        *eye_splats, &light, &*light_splats, context.target);
+  const auto spread = [&](double distance_along_axis) {
+    return BlurLightBuffer(
+        gpu, buffers.before, buffers.scratch,
+        BlurVariance(context, light_projection, distance_along_axis / light_along_axis),
+        source.shadow_density, traversal.colored_light_buffer);
+  };
   ShadowResult result;
   for (size_t s = 0; s + 1 < order.slice_begin.size(); ++s) {
     if (context.stop.stop_requested()) return absl::CancelledError("frame cancelled");
     const uint32_t begin = order.slice_begin[s];
     const uint32_t end = order.slice_begin[s + 1];
     if (traversal.blur && s > 0) {
-      const double distance =
-          (order.slice_position[s] - order.slice_position[s - 1]) / light_along_axis;
-      if (absl::Status status =
-              BlurLightBuffer(gpu, buffers.before, buffers.scratch,
-                              BlurVariance(context, light_projection, distance),
-                              source.shadow_density, traversal.colored_light_buffer);
-          !status.ok()) {
-        return status;
-      }
+      const double distance = order.slice_position[s] - order.slice_position[s - 1];
+      if (absl::Status status = spread(distance); !status.ok()) return status;
     }
     LightBuffer& deposit_into = traversal.interpolate ? buffers.after : buffers.before;
     const auto deposit = [&] {
@@ -202,6 +201,11 @@ absl::StatusOr<ShadowResult> HalfAngle::Draw(const TraversalContext& context,
     }
   }
   if (traversal.keep_light_buffer) {
+    // The buffer stands at the middle of the last slice; shown is the light behind all particles.
+    if (traversal.blur) {
+      const double distance = order.end_position - order.slice_position.back();
+      if (absl::Status status = spread(distance); !status.ok()) return status;
+    }
     result.light_buffer = ReadLightBuffer(buffers.before, traversal.colored_light_buffer);
   }
   return result;

@@ -75,7 +75,7 @@ TEST_P(OneParticle, CoversWhatTheClosedFormSays) {
   }
   ASSERT_GT(covered, 0.0) << "the case shows nothing";
   RecordProperty("largest_error", std::to_string(largest_error));
-  EXPECT_LT(largest_error, 2e-5);
+  EXPECT_LT(largest_error, 1e-5);
 }
 
 INSTANTIATE_TEST_SUITE_P(

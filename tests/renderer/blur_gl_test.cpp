@@ -1,0 +1,136 @@
+// The light's sideways spread: how wide it is, and what it does not depend on.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "tests/renderer/gl_fixture.h"
+
+namespace halflight {
+namespace {
+
+class Blur : public test::GlTest {
+ protected:
+  // A faint occluder at the top of a column, 2 units long, of particles too faint to shadow, wide
+  // enough that the light buffer holds the spread occluder. The light travels down the column, and
+  // the camera looks at right angles to it.
+  static Scene Column() {
+    Scene scene;
+    auto set = std::make_shared<ParticleSet>();
+    set->positions.emplace_back(0.0F, 0.0F, 0.0F);
+    set->radii.push_back(0.1F);
+    set->opacities.push_back(0.01F);
+    const glm::vec2 corners[] = {{-1.5F, -1.5F}, {1.5F, -1.5F}, {-1.5F, 1.5F}, {1.5F, 1.5F}};
+    for (int k = 0; k < 2048; ++k) {
+      const glm::vec2 corner = corners[k % 4];
+      set->positions.emplace_back(corner.x, -2.0F * static_cast<float>(k) / 2047.0F, corner.y);
+      set->radii.push_back(0.05F);
+      set->opacities.push_back(1e-9F);
+    }
+    scene.particles = set;
+    scene.camera = test::LookAt({0, 5, 0.001}, {0, -1, 0}, 16, 16);
+    scene.lights = {test::Sun({0, -1, 0})};
+    scene.material.scattering_spread = 0.15F;
+    scene.shadow.light_buffer_size = 256;
+    return scene;
+  }
+
+  // Standard deviation along the buffer's x of the optical depth, world units.
+  static double Width(const FrameResult& frame) {
+    const Image& image = frame.images[0];
+    double sum = 0.0;
+    double first = 0.0;
+    double second = 0.0;
+    for (int y = 0; y < image.height; ++y) {
+      for (int x = 0; x < image.width; ++x) {
+        const double depth = std::max(*test::PixelAt(image, x, y), 0.0F);
+        sum += depth;
+        first += depth * x;
+        second += depth * x * x;
+      }
+    }
+    const glm::dmat4& texture = frame.lights[0].light_texture_from_world;
+    const double texels_per_unit =
+        glm::length(glm::dvec3(texture[0][0], texture[1][0], texture[2][0])) * image.width;
+    return std::sqrt(second / sum - std::pow(first / sum, 2)) / texels_per_unit;
+  }
+
+  static FrameResult RenderDepth(const Scene& scene) {
+    return Render({scene, {{ImageKind::kLightBuffer, 0, LightQuantity::kOpticalDepth}}});
+  }
+};
+
+TEST_F(Blur, IsAsWideWithSixteenSlicesAsWithTwoHundredAndFiftySix) {
+  Scene scene = Column();
+  scene.shadow.slices = 16;
+  const double coarse = Width(RenderDepth(scene));
+  scene.shadow.slices = 256;
+  const double fine = Width(RenderDepth(scene));
+  RecordProperty("width_16_over_256", std::to_string(coarse / fine));
+  EXPECT_NEAR(coarse / fine, 1.0, 0.03);
+}
+
+TEST_F(Blur, HasTheVarianceOfItsDistance) {
+  Scene scene = Column();
+  scene.shadow.slices = 256;
+  const double blurred = Width(RenderDepth(scene));
+  scene.material.scattering_spread = 0.0F;
+  const double sharp = Width(RenderDepth(scene));
+  // 2 world units of travel at 0.15 a unit.
+  EXPECT_NEAR(std::sqrt(blurred * blurred - sharp * sharp), 0.15 * std::sqrt(2.0), 0.005);
+}
+
+TEST_F(Blur, DoesNotDependOnTheResolutionOfTheLightBuffer) {
+  Scene scene = Column();
+  scene.shadow.light_buffer_size = 128;
+  const double coarse = Width(RenderDepth(scene));
+  scene.shadow.light_buffer_size = 512;
+  EXPECT_NEAR(coarse / Width(RenderDepth(scene)), 1.0, 0.03);
+}
+
+TEST_F(Blur, OfTexelsPerSliceFollowsTheSlicesAsThePublishedSampleDoes) {
+  Scene scene = Column();
+  scene.material.scattering_spread = 0.0F;
+  scene.shadow.blur_mode = BlurMode::kTexelsPerSlice;
+  scene.shadow.blur_texels = 1.0F;
+  scene.shadow.slices = 16;
+  const double few = Width(RenderDepth(scene));
+  scene.shadow.slices = 128;
+  EXPECT_GT(Width(RenderDepth(scene)), 1.8 * few);
+}
+
+TEST_F(Blur, LetsLightIntoTheShadow) {
+  // Behind a wide dark screen the middle stays dark and the edge brightens.
+  Scene scene = test::BallScene(3000);
+  scene.material.opacity = 0.5F;
+  scene.lights = {test::Sun({0, 0, 1})};
+  const auto mean_transmittance = [&] {
+    const Image image = Render({scene, {{ImageKind::kLightBuffer}}}).images[0];
+    double sum = 0.0;
+    for (const float value : image.pixels) sum += value;
+    return sum / static_cast<double>(image.pixels.size());
+  };
+  const double sharp = mean_transmittance();
+  scene.material.scattering_spread = 0.3F;
+  EXPECT_GT(mean_transmittance(), sharp + 0.02);
+}
+
+TEST_F(Blur, TreatsEveryColourByItsOwnDensity) {
+  Scene scene = Column();
+  auto dark = std::make_shared<ParticleSet>(*scene.particles);
+  dark->opacities[0] = 0.9F;
+  scene.particles = dark;
+  scene.lights[0].shadow_density = {1.0F, 1.0F, 3.0F};
+  const Image colored = Render({scene, {{ImageKind::kLightBuffer}}}).images[0];
+  scene.lights[0].shadow_density = glm::vec3(3.0F);
+  const Image grey = Render({scene, {{ImageKind::kLightBuffer}}}).images[0];
+  double red_below = 0.0;
+  for (size_t i = 0; i < grey.pixels.size(); ++i) {
+    ASSERT_EQ(colored.pixels[3 * i], colored.pixels[3 * i + 1]);
+    ASSERT_NEAR(colored.pixels[3 * i + 2], grey.pixels[i], 1e-5);
+    red_below += colored.pixels[3 * i] - colored.pixels[3 * i + 2];
+  }
+  EXPECT_GT(red_below, 0.0);
+}
+
+}  // namespace
+}  // namespace halflight
