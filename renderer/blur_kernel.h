@@ -13,8 +13,7 @@ namespace halflight {
 // at most kMaxBlurVariance.
 std::vector<float> DiscreteGaussian(double variance);
 
-// The kernel of this variance still fits into shader::kMaxBlurRadius; larger blurs take several
-// steps.
+// The kernel of this variance still fits into shader::kMaxBlurRadius.
 inline constexpr double kMaxBlurVariance = 100.0;
 
 }  // namespace halflight

@@ -122,7 +122,7 @@ bool Matches(const Candidate& candidate, const DeviceChoice& choice) {
 // GL_DEVICE_UUID_EXT of the current context in hex; empty where the driver does not tell.
 std::string CurrentDeviceUuid() {
   if (!epoxy_has_gl_extension("GL_EXT_memory_object")) return "";
-  std::array<GLubyte, GL_UUID_SIZE_EXT> uuid{};
+  std::array<GLubyte, GL_UUID_SIZE_EXT> uuid = {};
   glGetUnsignedBytei_vEXT(GL_DEVICE_UUID_EXT, 0, uuid.data());
   std::string hex;
   for (const GLubyte byte : uuid) absl::StrAppend(&hex, absl::Hex(byte, absl::kZeroPad2));

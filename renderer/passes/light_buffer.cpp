@@ -28,15 +28,16 @@ const gl::ProgramSource& BlurProgram() {
   return source;
 }
 
-absl::Status BlurAlongAxis(Gpu& gpu, const LightBuffer& from, const LightBuffer& to,
-                           const glm::uvec2& axis, double variance, const glm::vec3& density,
-                           bool colored) {
+// One pass of the kernel of `variance`, taking every stride-th texel along `axis`.
+absl::Status BlurOnce(Gpu& gpu, const LightBuffer& from, const LightBuffer& to,
+                      const glm::uvec2& axis, uint32_t stride, double variance,
+                      const glm::vec3& density, bool colored) {
   const absl::StatusOr<GLuint> program =
       gpu.programs.Get(BlurProgram(), {{shader::kColoredLightBufferConstant, colored}});
   if (!program.ok()) return program.status();
   const std::vector<float> weights = DiscreteGaussian(variance);
   shader::BlurBlock block{};
-  block.axis = {axis, static_cast<uint32_t>(weights.size()) - 1, 0U};
+  block.axis = {axis * stride, static_cast<uint32_t>(weights.size()) - 1, 0U};
   block.density = glm::vec4(density, 0.0F);
   for (size_t n = 0; n < weights.size(); ++n) {
     block.weights[n / 4][static_cast<glm::length_t>(n % 4)] = weights[n];
@@ -50,6 +51,27 @@ absl::Status BlurAlongAxis(Gpu& gpu, const LightBuffer& from, const LightBuffer&
   glBindBufferBase(GL_UNIFORM_BUFFER, shader::kBlurBinding, uniforms.name());
   glBindTextureUnit(shader::kSourceBinding, from.texture.name());
   DrawFullscreen(gpu);
+  return absl::OkStatus();
+}
+
+// Blurs `buffer` along one axis. Kernels applied in turn add their variances; what earlier ones
+// have smoothed, later ones may take in strides, so that any width needs a handful of passes.
+absl::Status BlurAlongAxis(Gpu& gpu, LightBuffer& buffer, LightBuffer& scratch,
+                           const glm::uvec2& axis, double variance, const glm::vec3& density,
+                           bool colored) {
+  // Light spread further than the buffer is wide is the same everywhere.
+  double left = std::min(variance, std::pow(buffer.texture.width(), 2));
+  for (uint32_t stride = 1; left > 0.0; stride *= 4) {
+    const double squared_stride = stride * stride;
+    const double now = std::min(left, kMaxBlurVariance * squared_stride);
+    if (absl::Status status =
+            BlurOnce(gpu, buffer, scratch, axis, stride, now / squared_stride, density, colored);
+        !status.ok()) {
+      return status;
+    }
+    std::swap(buffer, scratch);
+    left -= now;
+  }
   return absl::OkStatus();
 }
 
@@ -96,26 +118,12 @@ void CopyLightBuffer(const LightBuffer& from, const LightBuffer& to) {
                      GL_TEXTURE_2D, 0, 0, 0, 0, from.texture.width(), from.texture.height(), 1);
 }
 
-absl::Status BlurLightBuffer(Gpu& gpu, const LightBuffer& buffer, const LightBuffer& scratch,
+absl::Status BlurLightBuffer(Gpu& gpu, LightBuffer& buffer, LightBuffer& scratch,
                              const glm::dvec2& variance, const glm::vec3& density, bool colored) {
   const gl::DebugScope scope("blur light buffer");
-  // Kernels of variances v1 and v2 in turn are the kernel of v1 + v2, so a wide one is taken in
-  // equal steps.
-  const double steps =
-      std::max(1.0, std::ceil(std::max(variance.x, variance.y) / kMaxBlurVariance));
-  for (double step = 0.0; step < steps; ++step) {
-    if (absl::Status status =
-            BlurAlongAxis(gpu, buffer, scratch, {1, 0}, variance.x / steps, density, colored);
-        !status.ok()) {
-      return status;
-    }
-    if (absl::Status status =
-            BlurAlongAxis(gpu, scratch, buffer, {0, 1}, variance.y / steps, density, colored);
-        !status.ok()) {
-      return status;
-    }
-  }
-  return absl::OkStatus();
+  absl::Status status = BlurAlongAxis(gpu, buffer, scratch, {1, 0}, variance.x, density, colored);
+  if (!status.ok()) return status;
+  return BlurAlongAxis(gpu, buffer, scratch, {0, 1}, variance.y, density, colored);
 }
 
 Image ReadLightBuffer(const LightBuffer& buffer, bool colored) {

@@ -28,8 +28,8 @@ absl::Status DepositSlice(Gpu& gpu, const OrderBuffers& order, const gl::Buffer&
 void CopyLightBuffer(const LightBuffer& from, const LightBuffer& to);
 
 // Spreads the light in `buffer` sideways by these variances along x and y, in squared texels;
-// `density` is the light's shadow density and `scratch` a buffer of the same size.
-absl::Status BlurLightBuffer(Gpu& gpu, const LightBuffer& buffer, const LightBuffer& scratch,
+// `density` is the light's shadow density. `scratch` is of the same size, its contents are lost.
+absl::Status BlurLightBuffer(Gpu& gpu, LightBuffer& buffer, LightBuffer& scratch,
                              const glm::dvec2& variance, const glm::vec3& density, bool colored);
 
 // The optical depth as it stands; one or three channels. Waits for the device.

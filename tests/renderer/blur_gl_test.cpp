@@ -98,6 +98,28 @@ TEST_F(Blur, OfTexelsPerSliceFollowsTheSlicesAsThePublishedSampleDoes) {
   EXPECT_GT(Width(RenderDepth(scene)), 1.8 * few);
 }
 
+TEST_F(Blur, OfAnyWidthEndsAndKeepsTheLight) {
+  Scene scene = test::BallScene(300);
+  scene.shadow.slices = 4;
+  for (const float spread : {1.0F, 100.0F, 1e30F}) {
+    scene.material.scattering_spread = spread;
+    const Image image = Render({scene, {{ImageKind::kLightBuffer}}}).images[0];
+    for (const float value : image.pixels) {
+      ASSERT_GE(value, 0.0F);
+      ASSERT_LE(value, 1.0F);
+    }
+  }
+}
+
+TEST_F(Blur, InStridesHasTheVarianceOfOnePass) {
+  Scene scene = Column();
+  scene.shadow.slices = 2;
+  scene.shadow.light_buffer_size = 1024;  // 2 units at 0.15: a deviation of about 50 texels
+  const double strided = Width(RenderDepth(scene));
+  scene.shadow.light_buffer_size = 128;  // and here of 6
+  EXPECT_NEAR(strided / Width(RenderDepth(scene)), 1.0, 0.02);
+}
+
 TEST_F(Blur, LetsLightIntoTheShadow) {
   // Behind a wide dark screen the middle stays dark and the edge brightens.
   Scene scene = test::BallScene(3000);

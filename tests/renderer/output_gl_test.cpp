@@ -8,7 +8,6 @@
 namespace halflight {
 namespace {
 
-using test::MaxDifference;
 using test::PixelAt;
 
 class Outputs : public test::GlTest {};
