@@ -86,7 +86,8 @@ struct SetAttribute {
   void operator()(int value) const { spec.attribute(name, value); }
   void operator()(const std::string& value) const { spec.attribute(name, value); }
   void operator()(const Chromaticities& value) const {
-    spec.attribute(name, OIIO::TypeDesc(OIIO::TypeDesc::FLOAT, value.size()), value.data());
+    spec.attribute(name, OIIO::TypeDesc(OIIO::TypeDesc::FLOAT, static_cast<int>(value.size())),
+                   value.data());
   }
   void operator()(const MatrixRows& value) const {
     spec.attribute(name, OIIO::TypeMatrix44, value.data());

@@ -31,7 +31,7 @@ std::string Refusal(const Image& image, ImageKind kind, const ImageMetadata& met
       Encode(image, kind, ImageFormat::kPng8, LightQuantity::kTransmittance, metadata);
   if (encoded.ok()) return "";
   EXPECT_EQ(encoded.status().code(), absl::StatusCode::kInvalidArgument);
-  return std::string(encoded.status().message());
+  return std::string{encoded.status().message()};
 }
 
 TEST(EncodeImage, GivesTheSameBytesASecondLaterAndOnOtherThreads) {
