@@ -15,6 +15,8 @@ namespace halflight {
 //       a tool need not guess. [x y z 1] M divided by w: (0, 0) is the top left corner.
 //   chromaticities  of sRGB's primaries and white, D65.
 //   capDate  empty: left alone, the library would make two equal frames differ.
+// DWAA and DWAB apply to RGB and RGBA; the library writes single channels with ZIP instead, so that
+// coverage, depth and grey light stay exact.
 // The matrices are 32-bit, as the standard has it: far from the world's origin, take the 64-bit
 // ones that come with the frame.
 absl::StatusOr<EncodedImage> EncodeExrHalf(const EncodeInput& input);

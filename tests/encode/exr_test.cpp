@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <filesystem>
 #include <limits>
 
 #include <gmock/gmock.h>
@@ -117,6 +118,17 @@ TEST(Exr, EveryCompressionIsTheOneAskedFor) {
   }
 }
 
+TEST(Exr, SingleChannelsAreNeverLossy) {
+  for (const ExrCompression compression : {ExrCompression::kDwaa, ExrCompression::kDwab}) {
+    const auto parts = DecodeExr(EncodeImage(
+        MakeImage(1, 1, {"Y"}, {0.3F}), ImageKind::kLightBuffer, LightQuantity::kTransmittance,
+        {.format = ImageFormat::kExrFloat, .compression = compression}, {}));
+    ASSERT_EQ(parts.size(), 1U);
+    EXPECT_EQ(parts[0].texts.at("compression"), "zip");
+    EXPECT_THAT(parts[0].values, testing::ElementsAre(0.3F));
+  }
+}
+
 TEST(Exr, WritesStandardAttributesUnderTheirNamesAndTypes) {
   ImageMetadata metadata = SidewaysCamera();
   metadata.text = {{"halflight:technique", "half_angle"}};
@@ -188,6 +200,7 @@ TEST(Exr, LayersAreNamedPartsInOrder) {
     const auto parts = DecodeExr(
         Encode(image, ImageKind::kLightLayers, format, LightQuantity::kOpticalDepth, metadata));
     ASSERT_EQ(parts.size(), 12U);
+    EXPECT_FALSE(std::filesystem::exists("memory.exr"));  // nothing is left on disk
     EXPECT_EQ(parts[0].texts.at("oiio:subimagename"), "layer.0000");
     EXPECT_EQ(parts[11].texts.at("oiio:subimagename"), "layer.0011");
     for (size_t layer = 0; layer < 12; ++layer) {

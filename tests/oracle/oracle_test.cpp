@@ -291,8 +291,8 @@ INSTANTIATE_TEST_SUITE_P(BothFlips, OracleHalfAngle,
 
 TEST(Oracle, FewSlicesSplitWhatManyOrder) {
   // 10 in 4 slices: 2, 3, 2, 3, as floor(s N / S) has it.
-  std::vector<glm::vec3> positions;
-  for (int i = 0; i < 10; ++i) positions.emplace_back(0.0F, 0.0F, static_cast<float>(-i));
+  std::vector<glm::vec3> positions(10, glm::vec3(0.0F));
+  for (size_t i = 0; i < positions.size(); ++i) positions[i].z = -static_cast<float>(i);
   const Scene scene = SceneOf(positions);
   const HalfAngleOrder order = OrderByHalfAngle(ResolveCloud(scene), Rays::Along({0.0, 0.0, -1.0}),
                                                 {0.0, 0.0, -1.0}, {.slices = 4});

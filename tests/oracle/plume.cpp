@@ -22,7 +22,7 @@ std::shared_ptr<ParticleSet> LoadPlume(const std::string& path) {
     words >> first >> second >> third;
     if (first == "format") format = second;
     if (first == "element" && second == "vertex") count = std::stoul(third);
-    if (first == "property") properties += second + ' ' + third + ';';
+    if (first == "property") properties.append(second).append(" ").append(third).append(";");
   }
   if (format != "binary_little_endian" ||
       properties != "float x;float y;float z;float vx;float vy;float vz;float age;") {
