@@ -1,0 +1,149 @@
+// Frames of the plume against independent float64 evaluations: the image model without shadows, and
+// half-angle slicing with an ideal light buffer.
+#include <gtest/gtest.h>
+
+#include <iostream>
+#include <string>
+
+#include "tests/oracle/image_error.h"
+#include "tests/oracle/oracle.h"
+#include "tests/oracle/plume.h"
+#include "tests/renderer/gl_fixture.h"
+
+namespace halflight {
+namespace {
+
+constexpr int kStride = 3;  // pixels of the oracle
+
+Scene PlumeScene(const char* frame) {
+  Scene scene;
+  scene.particles =
+      oracle::LoadPlume(std::string(HALFLIGHT_TEST_DATA) + "/plume/plume." + frame + ".ply");
+  scene.camera = test::LookAt({0.5, 1.5, 4.6}, {0, 1.25, 0}, 240, 240);
+  scene.material.radius = 0.045F;
+  scene.material.opacity = 0.18F;
+  scene.shadow.slices = 64;
+  scene.shadow.light_buffer_size = 1024;
+  return scene;
+}
+
+class Plume : public test::GlTest {};
+
+TEST_F(Plume, WithoutShadowsCoversWhatTheModelSays) {
+  for (const char* frame : {"0024", "0040"}) {
+    const Scene scene = PlumeScene(frame);
+    ASSERT_NE(scene.particles, nullptr);
+    const oracle::OracleImage reference = oracle::RenderUnshadowed(scene, {.stride = kStride});
+    const double rmse = oracle::CompareCoverage(RenderBeauty(scene), reference).rmse;
+    RecordProperty(std::string("coverage_rmse_") + frame, std::to_string(rmse));
+    EXPECT_LT(rmse, 1e-4) << frame;
+  }
+}
+
+struct ShadowCase {
+  const char* name;
+  glm::dvec3 light;
+  bool interpolate = true;
+  SliceSpacing spacing = SliceSpacing::kEqualCount;
+  glm::vec3 density{1.0F};
+  bool point = false;
+  float phase_g = 0.0F;
+  bool orthographic = false;
+  Profile profile = Profile::kSoft;
+  bool varied = false;  // radius, opacity, colour and emission of each particle its own
+};
+
+void VaryParticles(Scene& scene) {
+  auto set = std::make_shared<ParticleSet>(*scene.particles);
+  for (size_t i = 0; i < set->size(); ++i) {
+    const auto phase = static_cast<float>(i % 17) / 17.0F;
+    set->radii.push_back(0.02F + 0.04F * phase);
+    set->opacities.push_back(0.05F + 0.4F * (1.0F - phase));
+    set->colors.emplace_back(phase, 0.5F, 1.0F - phase);
+    set->emissions.emplace_back(i % 29 == 0 ? 0.3F : 0.0F, 0.0F, 0.0F);
+  }
+  scene.particles = set;
+}
+
+class PlumeLit : public test::GlTest, public testing::WithParamInterface<ShadowCase> {};
+
+TEST_P(PlumeLit, IsHalfAngleSlicingWithinHalfAPercent) {
+  const ShadowCase& c = GetParam();
+  Scene scene = PlumeScene("0040");
+  ASSERT_NE(scene.particles, nullptr);
+  Light light = test::Sun(c.light);
+  if (c.point) light.kind = PointLight{c.light};
+  light.shadow_density = c.density;
+  scene.lights = {light};
+  scene.shadow.interpolate = c.interpolate;
+  scene.shadow.spacing = c.spacing;
+  scene.material.phase_g = c.phase_g;
+  scene.material.profile = c.profile;
+  if (c.varied) VaryParticles(scene);
+  if (c.orthographic) scene.camera.projection = Orthographic{3.4};
+  const oracle::OracleImage reference = oracle::RenderHalfAngle(scene, {.stride = kStride});
+  const oracle::ImageError error = oracle::CompareColor(RenderBeauty(scene), reference);
+  RecordProperty("relative_rmse", std::to_string(error.relative_rmse));
+  RecordProperty("bias", std::to_string(error.bias));
+  std::cout << c.name << ": " << error.ToString() << "\n";
+  EXPECT_LT(error.relative_rmse, 0.005);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Lights, PlumeLit,
+    testing::Values(
+        ShadowCase{"NearlyParallel", {-0.2, -0.3, -1}}, ShadowCase{"Slanted", {1, -0.6, -0.6}},
+        ShadowCase{"BeforeTheFlip", {1, -0.2, -0.15}}, ShadowCase{"PastTheFlip", {1, -0.2, 0.3}},
+        ShadowCase{"FromBehind", {0.3, -0.4, 1}},
+        ShadowCase{"PlainSlanted", {1, -0.6, -0.6}, false},
+        ShadowCase{"PlainFromBehind", {0.3, -0.4, 1}, false},
+        ShadowCase{"VariedByCount",
+                   {1, -0.6, -0.6},
+                   true,
+                   SliceSpacing::kEqualCount,
+                   glm::vec3(1),
+                   false,
+                   0.0F,
+                   false,
+                   Profile::kSoft,
+                   true},
+        ShadowCase{"VariedByOpticalDepth",
+                   {1, -0.6, -0.6},
+                   true,
+                   SliceSpacing::kEqualOpticalDepth,
+                   glm::vec3(1),
+                   false,
+                   0.0F,
+                   false,
+                   Profile::kSoft,
+                   true},
+        ShadowCase{"Coloured", {1, -0.6, -0.6}, true, SliceSpacing::kEqualCount, {0.3F, 1, 2}},
+        ShadowCase{"PointLight", {2, 3, 1.5}, true, SliceSpacing::kEqualCount, glm::vec3(1), true},
+        ShadowCase{"ForwardScattering",
+                   {0.3, -0.4, 1},
+                   true,
+                   SliceSpacing::kEqualCount,
+                   glm::vec3(1),
+                   false,
+                   0.6F},
+        ShadowCase{"Orthographic",
+                   {1, -0.6, -0.6},
+                   true,
+                   SliceSpacing::kEqualCount,
+                   glm::vec3(1),
+                   false,
+                   0.0F,
+                   true},
+        ShadowCase{"Balls",
+                   {1, -0.6, -0.6},
+                   true,
+                   SliceSpacing::kEqualCount,
+                   glm::vec3(1),
+                   false,
+                   0.0F,
+                   false,
+                   Profile::kBall}),
+    [](const auto& param) { return param.param.name; });
+
+}  // namespace
+}  // namespace halflight
