@@ -144,7 +144,7 @@ Bounds Union(const Bounds& a, const Bounds& b) {
 
 double EstimateRadius(const Particles& particles) {
   constexpr size_t kNeighbour = 8;
-  constexpr double kFactor = 2.4;
+  constexpr double kFactor = 2.5;
   const size_t count = particles.size();
   if (count < 2) {
     return 1;

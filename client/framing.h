@@ -24,7 +24,7 @@ struct Bounds {
 std::optional<Bounds> BoundsOf(const Particles& particles, double radius);
 Bounds Union(const Bounds& a, const Bounds& b);
 
-// A radius with which neighbours overlap enough to look like smoke rather than dots: 2.4 times the
+// A radius with which neighbours overlap enough to look like smoke rather than dots: 2.5 times the
 // median distance to the eighth nearest neighbour, over up to 512 particles evenly picked. The
 // factor gives the plume of the tests, whose authors like 0.045, that radius. Where neighbours
 // coincide: a hundredth of the extent; 1 where there is no extent either, or no particle.
