@@ -1,0 +1,43 @@
+#include "client/cli/connection.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <utility>
+
+#include "client/cli/exit_code.h"
+
+namespace halflight::client {
+
+Connection::Connection(std::optional<LocalServer> server, Client client)
+    : server_(std::move(server)), client_(std::move(client)) {}
+
+absl::StatusOr<Connection> Connection::Open(const ConnectionOptions& options,
+                                            const std::stop_token& stop) {
+  ClientOptions client_options;
+  client_options.timeout = std::chrono::milliseconds(std::llround(options.timeout_s * 1000));
+  client_options.stop = stop;
+  if (!options.server.empty()) {
+    auto client = Client::Connect(options.server, client_options);
+    if (!client.ok()) {
+      return WithExitCode(absl::InvalidArgumentError(
+                              fmt::format("--server: {}", std::string(client.status().message()))),
+                          ExitCode::kUsage);
+    }
+    return Connection(std::nullopt, *std::move(client));
+  }
+  LocalServerOptions server_options;
+  server_options.device = options.device;
+  server_options.stop = stop;
+  auto server = LocalServer::Start(server_options);
+  if (!server.ok()) {
+    return WithExitCode(server.status(), ExitCode::kServerUnavailable);
+  }
+  auto client = Client::Connect(server->address(), client_options);
+  if (!client.ok()) {
+    return WithExitCode(client.status(), ExitCode::kServerUnavailable);
+  }
+  return Connection(*std::move(server), *std::move(client));
+}
+
+}  // namespace halflight::client

@@ -1,0 +1,318 @@
+#include "client/cli/flags.h"
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <cmath>
+#include <utility>
+
+#include "client/cli/flag_values.h"
+#include "client/readers/reader.h"
+#include "client/readers/text.h"
+
+namespace halflight::client {
+
+namespace {
+
+// Unwraps a parsed value, or tells CLI11 what is wrong with the flag.
+template <typename T>
+T ValueOr(const std::string& flag, absl::StatusOr<T> value) {
+  if (!value.ok()) {
+    throw CLI::ValidationError(flag, std::string(value.status().message()));
+  }
+  return *std::move(value);
+}
+
+// A flag with one value that `parse` reads into `target`.
+template <typename Target, typename T>
+CLI::Option* Add(CLI::App& app, const std::string& flag, Target& target,
+                 absl::StatusOr<T> (*parse)(std::string_view), const std::string& help,
+                 const std::string& type) {
+  return app
+      .add_option_function<std::string>(
+          flag,
+          [&target, parse, flag](const std::string& text) { target = ValueOr(flag, parse(text)); },
+          help)
+      ->type_name(type);
+}
+
+// A repeatable flag, each time with one value.
+template <typename T>
+CLI::Option* AddEach(CLI::App& app, const std::string& flag, std::vector<T>& target,
+                     absl::StatusOr<T> (*parse)(std::string_view), const std::string& help,
+                     const std::string& type) {
+  return app
+      .add_option_function<std::vector<std::string>>(
+          flag,
+          [&target, parse, flag](const std::vector<std::string>& texts) {
+            for (const std::string& text : texts) {
+              target.push_back(ValueOr(flag, parse(text)));
+            }
+          },
+          help)
+      ->type_name(type)
+      ->allow_extra_args(false);
+}
+
+// The numbers that a flag takes.
+struct Range {
+  double low;
+  double high;
+  const char* in_words;
+  bool low_included = true;
+  bool high_included = true;
+};
+constexpr Range kPositive{0, HUGE_VAL, "a number > 0", false, false};
+constexpr Range kNotNegative{0, HUGE_VAL, "a number >= 0", true, false};
+
+CLI::Option* AddNumber(CLI::App& app, const std::string& flag, std::optional<double>& target,
+                       const Range& range, const std::string& help) {
+  return app
+      .add_option_function<std::string>(
+          flag,
+          [&target, range, flag](const std::string& text) {
+            const auto value = ParseNumber(text);
+            const bool fits =
+                value && (*value > range.low || (range.low_included && *value == range.low)) &&
+                (*value < range.high || (range.high_included && *value == range.high));
+            if (!fits) {
+              throw CLI::ValidationError(flag,
+                                         fmt::format("is '{}'; allowed: {}", text, range.in_words));
+            }
+            target = value;
+          },
+          help)
+      ->type_name("NUMBER");
+}
+
+CLI::Option* AddCount(CLI::App& app, const std::string& flag, std::optional<uint32_t>& target,
+                      uint32_t low, uint32_t high, const std::string& help) {
+  return app
+      .add_option_function<std::string>(
+          flag,
+          [&target, low, high, flag](const std::string& text) {
+            const auto value = ParseCount(text);
+            if (!value || *value < low || *value > high) {
+              throw CLI::ValidationError(flag, fmt::format("is '{}'; allowed: a whole number from "
+                                                           "{} to {}",
+                                                           text, low, high));
+            }
+            target = static_cast<uint32_t>(*value);
+          },
+          help)
+      ->type_name("COUNT");
+}
+
+template <typename T>
+CLI::Option* AddChoice(CLI::App& app, const std::string& flag, std::optional<T>& target,
+                       const std::vector<std::pair<std::string, T>>& choices,
+                       const std::string& help) {
+  std::string names;
+  for (const auto& [name, value] : choices) {
+    names += fmt::format("{}{}", names.empty() ? "" : "|", name);
+  }
+  return app
+      .add_option_function<std::string>(
+          flag,
+          [&target, choices, flag, names](const std::string& text) {
+            for (const auto& [name, value] : choices) {
+              if (text == name) {
+                target = value;
+                return;
+              }
+            }
+            throw CLI::ValidationError(flag, fmt::format("is '{}'; allowed: {}", text, names));
+          },
+          help)
+      ->type_name(names);
+}
+
+void AddConnectionFlags(CLI::App& app, ConnectionOptions& options) {
+  auto* const server =
+      app.add_option("--server", options.server,
+                     "Use this server (host:port or unix:path) instead of starting halflightd")
+          ->type_name("ADDRESS");
+  app.add_option("--device", options.device, "Device of the halflightd that is started")
+      ->type_name("DEVICE")
+      ->excludes(server);
+  app.add_option_function<std::string>(
+         "--timeout",
+         [&options](const std::string& text) {
+           const auto value = ParseNumber(text);
+           if (!value || !(*value >= 0) || *value > 1e6) {
+             throw CLI::ValidationError(
+                 "--timeout", fmt::format("is '{}'; allowed: seconds from 0 (never) to 1e6", text));
+           }
+           options.timeout_s = *value;
+         },
+         "Longest wait for a frame (default 600; 0: for ever)")
+      ->type_name("SECONDS");
+}
+
+void AddFileFlags(CLI::App& app, RenderOptions& options) {
+  app.add_option("input", options.input,
+                 "Particle file, or with --frames a pattern such as 'plume.%04d.ply'")
+      ->type_name("FILE");
+  app.add_option_function<std::string>(
+         "--format",
+         [&options](const std::string& text) {
+           if ((", " + FormatNames() + ",").find(", " + text + ",") == std::string::npos) {
+             throw CLI::ValidationError("--format",
+                                        fmt::format("is '{}'; allowed: {}", text, FormatNames()));
+           }
+           options.format = text;
+         },
+         "Format of the input (" + FormatNames() + "); default: by its extension")
+      ->type_name("FORMAT");
+  Add(app, "--frames", options.frames, ParseFrames,
+      "Frames of a sequence: 24-40, 24-40x2, 1,5,24-40", "LIST");
+  AddEach(app, "-o,--output", options.outputs, ParseOutput,
+          "Write an output: PATH (beauty) or NAME=PATH, NAME one of " + OutputNames() +
+              "; .png, .exr, .raw or .bin; repeatable",
+          "[NAME=]PATH");
+  app.add_option("--scene", options.scene_path,
+                 "Start from this RenderFrameRequest in protobuf JSON; flags override it")
+      ->type_name("FILE");
+  app.add_flag("--print-scene", options.print_scene,
+               "Write the request as JSON for --scene to stdout; render nothing");
+}
+
+void AddOutputFlags(CLI::App& app, RenderOptions& options) {
+  AddChoice<uint32_t>(app, "--bits", options.png_bits, {{"8", 8}, {"16", 16}},
+                      "Bits a channel of PNGs; default: 8");
+  AddChoice<v1::ImageFormat>(
+      app, "--exr", options.exr_format,
+      {{"half", v1::IMAGE_FORMAT_EXR_HALF}, {"float", v1::IMAGE_FORMAT_EXR_FLOAT}},
+      "Numbers in EXRs; default: half, but float for depth and optical depth");
+  AddChoice<v1::ExrCompression>(app, "--exr-compression", options.exr_compression,
+                                {{"none", v1::EXR_COMPRESSION_NONE},
+                                 {"rle", v1::EXR_COMPRESSION_RLE},
+                                 {"zips", v1::EXR_COMPRESSION_ZIPS},
+                                 {"zip", v1::EXR_COMPRESSION_ZIP},
+                                 {"piz", v1::EXR_COMPRESSION_PIZ},
+                                 {"dwaa", v1::EXR_COMPRESSION_DWAA},
+                                 {"dwab", v1::EXR_COMPRESSION_DWAB}},
+                                "Compression of EXRs; default: zips");
+  AddChoice<v1::LightQuantity>(app, "--quantity", options.quantity,
+                               {{"transmittance", v1::LIGHT_QUANTITY_TRANSMITTANCE},
+                                {"optical-depth", v1::LIGHT_QUANTITY_OPTICAL_DEPTH}},
+                               "What light and layers hold; default: transmittance");
+  AddCount(app, "--output-light", options.output_light, 0, 1000,
+           "Which light transmittance, light and layers are of, counted from 0; default: 0");
+}
+
+void AddCameraFlags(CLI::App& app, RenderOptions& options) {
+  Add(app, "--size", options.size, ParseSize, "Size of the image; default: 640x480", "WxH");
+  Add(app, "--crop", options.crop, ParseCrop, "Render only this part of the image", "X,Y,W,H");
+  Add(app, "--eye", options.eye, ParseVector,
+      "Where the camera is; default: a three-quarter view that shows all particles", "X,Y,Z");
+  Add(app, "--target", options.target, ParseVector,
+      "What the camera looks at; default: the middle of the particles", "X,Y,Z");
+  Add(app, "--up", options.up, ParseVector, "What appears upward; default: 0,1,0", "X,Y,Z");
+  auto* const fov =
+      AddNumber(app, "--fov", options.fov_deg, {0, 179, "degrees, > 0 and < 179", false, false},
+                "Vertical field of view in degrees; default: 40");
+  app.add_flag("--ortho", options.ortho, "Parallel projection that shows all particles")
+      ->excludes(fov);
+  AddNumber(app, "--ortho-height", options.ortho_height, kPositive,
+            "Parallel projection of this height, world units")
+      ->excludes(fov);
+}
+
+void AddLightFlags(CLI::App& app, RenderOptions& options) {
+  app.add_option_function<std::vector<std::string>>(
+         "--light",
+         [&options](const std::vector<std::string>& texts) {
+           options.lights.emplace();
+           for (const std::string& text : texts) {
+             if (texts.size() > 1 || text != "none") {
+               options.lights->push_back(ValueOr("--light", ParseLight(text)));
+             }
+           }
+         },
+         "A light: X,Y,Z (direction of travel), point:X,Y,Z, camera, or none; repeatable; default: "
+         "from the upper left of the view")
+      ->type_name("LIGHT")
+      ->allow_extra_args(false);
+  AddEach(app, "--light-color", options.light_colors, ParseColor,
+          "Colour of all lights, or repeated of each; default: 1", "R,G,B");
+  AddEach(app, "--density", options.densities, ParseColor,
+          "Shadow density, one number or R,G,B, of all lights, or repeated of each; default: 1",
+          "R,G,B");
+  app.add_flag("--falloff", options.falloff, "Point lights fall off with the squared distance");
+}
+
+void AddMaterialFlags(CLI::App& app, RenderOptions& options) {
+  AddNumber(app, "--radius", options.radius, kPositive,
+            "Radius of every particle, world units, also where the file has radii; default: the "
+            "file's, or estimated from the spacing");
+  AddNumber(app, "--opacity", options.opacity, {0, 1, "a number from 0 to 1"},
+            "Opacity of every particle at its centre, also where the file has opacities; default: "
+            "the file's, or 0.18");
+  Add(app, "--albedo", options.albedo, ParseColor, "Multiplies the particles' colours", "R,G,B");
+  Add(app, "--ambient", options.ambient, ParseColor, "Unshadowed light; default: 0.1", "R,G,B");
+  Add(app, "--emission", options.emission, ParseColor,
+      "Radiance of every particle, also where the file has emissions", "R,G,B");
+  AddChoice<v1::Profile>(app, "--profile", options.profile,
+                         {{"soft", v1::PROFILE_SOFT}, {"ball", v1::PROFILE_BALL}},
+                         "How particles thin out towards their edge; default: soft");
+  AddNumber(app, "--phase-g", options.phase_g, {-1, 1, "a number > -1 and < 1", false, false},
+            "Mean cosine of scattering; default: 0");
+  AddNumber(app, "--scattering", options.scattering_spread, kNotNegative,
+            "Sideways spread of light a world unit; default: 0");
+}
+
+void AddShadowFlags(CLI::App& app, RenderOptions& options) {
+  AddChoice<v1::ShadowTechnique>(app, "--technique", options.technique,
+                                 {{"half-angle", v1::SHADOW_TECHNIQUE_HALF_ANGLE}},
+                                 "How shadows are computed");
+  AddCount(app, "--slices", options.slices, 1, INT32_MAX, "Slices; default: 128");
+  app.add_flag("--plain", options.plain, "Do not interpolate the light within a slice");
+  AddChoice<v1::SliceSpacing>(app, "--spacing", options.spacing,
+                              {{"count", v1::SLICE_SPACING_EQUAL_COUNT},
+                               {"optical-depth", v1::SLICE_SPACING_EQUAL_OPTICAL_DEPTH}},
+                              "What slices have in equal parts; default: count");
+  AddCount(app, "--light-buffer", options.light_buffer_size, 16, 65536,
+           "Width and height of the light buffer in texels; default: 512");
+  AddChoice<v1::BlurMode>(
+      app, "--blur", options.blur_mode,
+      {{"distance", v1::BLUR_MODE_DISTANCE}, {"texels", v1::BLUR_MODE_TEXELS_PER_SLICE}},
+      "How --scattering blurs: by distance, or --blur-texels each slice");
+  AddNumber(app, "--blur-texels", options.blur_texels, {0, 64, "a number > 0, 64 at most", false},
+            "Blur of each slice in texels; implies --blur texels");
+  auto* const supersample =
+      AddCount(app, "--supersample", options.supersample, 1, 8, "N x N samples a pixel");
+  AddCount(app, "--downsample", options.downsample, 1, 8, "One sample for N x N pixels")
+      ->excludes(supersample);
+  AddNumber(app, "--time-offset", options.time_offset_s, {-1e9, 1e9, "seconds"},
+            "Move particles along their velocities by this many seconds");
+}
+
+}  // namespace
+
+void AddRenderFlags(CLI::App& app, RenderOptions& options) {
+  struct Group {
+    const char* name;
+    void (*add)(CLI::App&, RenderOptions&);
+  };
+  for (const Group& group :
+       {Group{"Files", AddFileFlags}, Group{"Storage", AddOutputFlags},
+        Group{"Camera", AddCameraFlags}, Group{"Lights", AddLightFlags},
+        Group{"Material", AddMaterialFlags}, Group{"Shadow and sampling", AddShadowFlags}}) {
+    app.option_defaults()->group(group.name);
+    group.add(app, options);
+  }
+  app.option_defaults()->group("Server and report");
+  AddConnectionFlags(app, options.connection);
+  app.add_option("--request-id", options.request_id, "Names the request in the server's log")
+      ->type_name("ID");
+  app.add_flag("--json", options.json, "Report on stdout as JSON, one line a frame");
+  app.add_flag("-q,--quiet", options.quiet, "Say nothing but errors");
+}
+
+void AddInfoFlags(CLI::App& app, InfoOptions& options) {
+  AddConnectionFlags(app, options.connection);
+  app.add_flag("--json", options.json, "Report as JSON");
+}
+
+}  // namespace halflight::client

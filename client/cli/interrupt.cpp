@@ -1,0 +1,35 @@
+#include "client/cli/interrupt.h"
+
+#include <pthread.h>
+#include <unistd.h>
+
+#include <csignal>
+
+#include "client/cli/exit_code.h"
+
+namespace halflight::client {
+
+InterruptWatch::InterruptWatch() {
+  sigset_t signals;
+  sigemptyset(&signals);
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
+    sigaddset(&signals, signal);
+  }
+  pthread_sigmask(SIG_BLOCK, &signals, nullptr);
+  thread_ = std::thread([this, signals] {
+    int signal = 0;
+    while (sigwait(&signals, &signal) == 0 && !over_) {
+      if (!source_.request_stop()) {
+        _exit(static_cast<int>(ExitCode::kInterrupted));
+      }
+    }
+  });
+}
+
+InterruptWatch::~InterruptWatch() {
+  over_ = true;
+  pthread_kill(thread_.native_handle(), SIGTERM);  // wakes the thread, and no other
+  thread_.join();
+}
+
+}  // namespace halflight::client

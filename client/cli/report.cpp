@@ -1,0 +1,102 @@
+#include "client/cli/report.h"
+
+#include <fmt/format.h>
+
+#include "client/cli/flag_values.h"
+#include "client/cli/json.h"
+#include "halflight/sha256.h"
+
+namespace halflight::client {
+
+namespace {
+
+double ServerMilliseconds(const v1::FrameHeader& header) {
+  double sum = 0;
+  for (const v1::StageTiming& timing : header.timings()) {
+    sum += timing.milliseconds();
+  }
+  return sum;
+}
+
+std::string OutputsJson(const FrameReport& report, const RenderedFrame& frame) {
+  std::string list;
+  for (size_t i = 0; i < report.paths.size(); ++i) {
+    const v1::OutputInfo& info = frame.header.outputs(static_cast<int>(i));
+    JsonObject output;
+    output.Add("name", OutputName(info.output().kind()));
+    output.Add("path", report.paths[i]);
+    output.Add("sha256", ToHex(frame.sha256[i]));
+    output.AddJson("info", JsonOf(info));
+    list += (i == 0 ? "" : ",") + output.Text();
+  }
+  return "[" + list + "]";
+}
+
+}  // namespace
+
+std::string ChoicesText(const std::vector<Choice>& choices) {
+  std::string text;
+  for (const Choice& choice : choices) {
+    text += fmt::format("{}: {}\n", choice.name, choice.value);
+  }
+  return text;
+}
+
+std::string FrameText(const FrameReport& report, const RenderedFrame& frame) {
+  std::string text;
+  for (size_t i = 0; i < report.paths.size(); ++i) {
+    const v1::OutputInfo& info = frame.header.outputs(static_cast<int>(i));
+    text += fmt::format("{}: {}, {} x {}", report.paths[i], OutputName(info.output().kind()),
+                        info.width(), info.height());
+    text += info.layers() > 1 ? fmt::format(" x {} layers", info.layers()) : "";
+    text += info.has_white_value() && info.has_black_value()
+                ? fmt::format(", white is {:.6g}, black is {:.6g}", info.white_value(),
+                              info.black_value())
+                : "";
+    text += fmt::format(", {} bytes\n", frame.outputs[i].size());
+  }
+  const v1::FrameMetadata& metadata = frame.header.metadata();
+  text += fmt::format("{}{} particles in {:.0f} ms (server {:.0f} ms) on {}\n",
+                      report.frame ? fmt::format("frame {}: ", *report.frame) : "",
+                      metadata.particle_count(), report.milliseconds,
+                      ServerMilliseconds(frame.header), metadata.gl_renderer());
+  if (metadata.clamped_opacities() > 0) {
+    text += fmt::format("{} opacities above 1 - 2^-20 were drawn as that\n",
+                        metadata.clamped_opacities());
+  }
+  return text;
+}
+
+std::string FrameJson(const FrameReport& report, const RenderedFrame& frame,
+                      const v1::RenderFrameRequest& request, const std::vector<Choice>& choices) {
+  std::string chosen;
+  for (const Choice& choice : choices) {
+    JsonObject item;
+    item.Add("name", choice.name);
+    item.Add("value", choice.value);
+    chosen += (chosen.empty() ? "" : ",") + item.Text();
+  }
+  std::string timings;
+  for (const v1::StageTiming& timing : frame.header.timings()) {
+    timings += (timings.empty() ? "" : ",") + JsonOf(timing);
+  }
+  JsonObject json;
+  if (report.frame) {
+    json.AddNumber("frame", *report.frame);
+  }
+  json.Add("input", report.input);
+  json.AddNumber("milliseconds", report.milliseconds);
+  json.AddNumber("server_milliseconds", ServerMilliseconds(frame.header));
+  json.Add("gl_renderer", frame.header.metadata().gl_renderer());
+  json.AddNumber("particle_count", frame.header.metadata().particle_count());
+  json.AddNumber("clamped_opacities", frame.header.metadata().clamped_opacities());
+  json.AddJson("outputs", OutputsJson(report, frame));
+  json.AddJson("choices", "[" + chosen + "]");
+  json.AddJson("request", JsonOf(request));
+  json.AddJson("metadata", JsonOf(frame.header.metadata()));
+  json.AddJson("plan", JsonOf(frame.header.plan()));
+  json.AddJson("timings", "[" + timings + "]");
+  return json.Text();
+}
+
+}  // namespace halflight::client

@@ -1,0 +1,302 @@
+#include "client/client.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "client/client_impl.h"
+#include "client/readers/text.h"
+#include "halflight/sha256.h"
+
+namespace halflight::client {
+
+namespace {
+
+constexpr size_t kUploadChunkBytes = size_t{256} << 10;
+// Chunks are far smaller; headers grow with outputs and layers.
+constexpr int kMaxReceivedBytes = 64 << 20;
+
+absl::Status CheckAddress(const std::string& address) {
+  const bool is_unix = address.rfind("unix:", 0) == 0;
+  const size_t colon = address.rfind(':');
+  const auto port = colon == std::string::npos
+                        ? std::nullopt
+                        : ParseCount(std::string_view(address).substr(colon + 1));
+  const bool is_tcp = !is_unix && colon != 0 && port && *port >= 1 && *port <= 65535;
+  if (is_tcp || (is_unix && address.size() > 5)) {
+    return absl::OkStatus();
+  }
+  return absl::InvalidArgumentError(
+      fmt::format("address is '{}'; allowed: host:port or unix:path", address));
+}
+
+}  // namespace
+
+absl::Status FromGrpc(const grpc::Status& status) {
+  return absl::Status(static_cast<absl::StatusCode>(status.error_code()), status.error_message());
+}
+
+std::optional<std::chrono::milliseconds> RetryHint(const grpc::ClientContext& context) {
+  const auto& metadata = context.GetServerTrailingMetadata();
+  const auto found = metadata.find("grpc-retry-pushback-ms");
+  if (found == metadata.end()) {
+    return std::nullopt;
+  }
+  const auto ms = ParseCount(std::string_view(found->second.data(), found->second.size()));
+  return ms && *ms < 3600000 ? std::optional(std::chrono::milliseconds(*ms)) : std::nullopt;
+}
+
+void SetRoute(grpc::ClientContext& context, std::string_view route) {
+  if (!route.empty()) {
+    context.AddMetadata("halflight-particle-sha256", ToHex(route));
+  }
+}
+
+Client::Impl::Impl(const std::string& address, ClientOptions options)
+    : address_(address), options_(std::move(options)) {
+  grpc::ChannelArguments arguments;
+  arguments.SetMaxReceiveMessageSize(kMaxReceivedBytes);
+  // A render server is near: a web proxy in the environment is not meant for it.
+  arguments.SetInt(GRPC_ARG_ENABLE_HTTP_PROXY, 0);
+  // The channel must not wait longer to connect again than the retries here wait.
+  arguments.SetInt(GRPC_ARG_INITIAL_RECONNECT_BACKOFF_MS, 50);
+  arguments.SetInt(GRPC_ARG_MIN_RECONNECT_BACKOFF_MS, 50);
+  arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, 1000);
+  arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
+  stub_ = v1::RenderService::NewStub(
+      grpc::CreateCustomChannel(address, grpc::InsecureChannelCredentials(), arguments));
+}
+
+absl::Status Client::Impl::Try(std::string_view route, const std::stop_token& stop,
+                               const std::function<absl::Status(grpc::ClientContext&)>& attempt) {
+  const auto deadline = Clock::now() + options_.timeout;
+  const bool has_deadline = options_.timeout.count() > 0;
+  Backoff backoff(options_.first_backoff);
+  for (int tries = 1;; ++tries) {
+    grpc::ClientContext context;
+    if (has_deadline) {
+      context.set_deadline(deadline);
+    }
+    SetRoute(context, route);
+    absl::Status status;
+    {
+      const std::stop_callback cancel(stop, [&context] { context.TryCancel(); });
+      status = attempt(context);
+    }
+    if (stop.stop_requested() && !status.ok()) {
+      return absl::CancelledError("interrupted");
+    }
+    if (!IsRetryable(status)) {
+      return status;
+    }
+    const auto wait = backoff.Next(RetryHint(context));
+    if (tries >= options_.max_attempts || (has_deadline && Clock::now() + wait > deadline)) {
+      return absl::Status(status.code(),
+                          fmt::format("{}, after {} of {} tries: {}", address_, tries,
+                                      options_.max_attempts, std::string(status.message())));
+    }
+    if (!SleepUnlessStopped(wait, stop)) {
+      return absl::CancelledError("interrupted");
+    }
+  }
+}
+
+absl::StatusOr<v1::GetServerInfoResponse> Client::Impl::GetServerInfo(const std::stop_token& stop) {
+  v1::GetServerInfoResponse response;
+  absl::Status status = Try("", stop, [&](grpc::ClientContext& context) {
+    return FromGrpc(stub_->GetServerInfo(&context, v1::GetServerInfoRequest(), &response));
+  });
+  if (!status.ok()) {
+    return status;
+  }
+  return response;
+}
+
+absl::StatusOr<v1::ServerLimits> Client::Impl::Limits(const std::stop_token& stop) {
+  const std::lock_guard lock(limits_mutex_);
+  if (!limits_) {
+    const auto info = GetServerInfo(stop);
+    if (!info.ok()) {
+      return info.status();
+    }
+    limits_ = info->limits();
+  }
+  return *limits_;
+}
+
+absl::StatusOr<std::vector<std::string>> Client::Impl::FindMissing(
+    const std::vector<std::string>& sha256, std::string_view route, const std::stop_token& stop) {
+  v1::FindMissingParticlesRequest request;
+  request.mutable_sha256()->Add(sha256.begin(), sha256.end());
+  v1::FindMissingParticlesResponse response;
+  absl::Status status = Try(route, stop, [&](grpc::ClientContext& context) {
+    return FromGrpc(stub_->FindMissingParticles(&context, request, &response));
+  });
+  if (!status.ok()) {
+    return status;
+  }
+  return std::vector<std::string>(response.missing_sha256().begin(),
+                                  response.missing_sha256().end());
+}
+
+absl::Status Client::Impl::UploadOnce(grpc::ClientContext& context,
+                                      const EncodedParticles& particles) {
+  v1::UploadParticlesResponse response;
+  const auto writer = stub_->UploadParticles(&context, &response);
+  v1::UploadParticlesRequest message;
+  v1::ParticleSetDescription& header = *message.mutable_header();
+  *header.mutable_layout() = particles.layout;
+  header.set_byte_size(particles.payload.size());
+  header.set_sha256(particles.sha256);
+  bool open = writer->Write(message);
+  // A write that fails means that the server has answered already, be it that it has the set.
+  for (size_t at = 0; open && at < particles.payload.size(); at += kUploadChunkBytes) {
+    message.set_chunk(particles.payload.data() + at,
+                      std::min(kUploadChunkBytes, particles.payload.size() - at));
+    open = writer->Write(message);
+  }
+  if (open) {
+    message.mutable_finish()->set_byte_size(particles.payload.size());
+    message.mutable_finish()->set_sha256(particles.sha256);
+    if (writer->Write(message)) {
+      writer->WritesDone();
+    }
+  }
+  return FromGrpc(writer->Finish());
+}
+
+absl::Status Client::Impl::Upload(const EncodedParticles& particles, std::string_view route,
+                                  const std::stop_token& stop) {
+  return Try(route, stop,
+             [&](grpc::ClientContext& context) { return UploadOnce(context, particles); });
+}
+
+absl::Status Client::Impl::EnsureUploaded(const EncodedParticles& particles, std::string_view route,
+                                          const std::stop_token& stop) {
+  const auto missing = FindMissing({particles.sha256}, route, stop);
+  if (!missing.ok() || missing->empty()) {
+    return missing.status();
+  }
+  // The server says RESOURCE_EXHAUSTED to a set that it will never take; no retry would cure that.
+  const auto limits = Limits(stop);
+  if (!limits.ok()) {
+    return limits.status();
+  }
+  if (limits->max_particles() != 0 && particles.layout.count() > limits->max_particles()) {
+    return absl::InvalidArgumentError(fmt::format("the set has {} particles; allowed: at most {}",
+                                                  particles.layout.count(),
+                                                  limits->max_particles()));
+  }
+  if (limits->max_particle_bytes() != 0 &&
+      particles.payload.size() > limits->max_particle_bytes()) {
+    return absl::InvalidArgumentError(fmt::format("the set has {} bytes; allowed: at most {}",
+                                                  particles.payload.size(),
+                                                  limits->max_particle_bytes()));
+  }
+  return Upload(particles, route, stop);
+}
+
+absl::StatusOr<RenderedFrame> Client::Impl::RenderOnce(grpc::ClientContext& context,
+                                                       const v1::RenderFrameRequest& request) {
+  const auto reader = stub_->RenderFrame(&context, request);
+  v1::RenderFrameResponse message;
+  FrameAssembler assembler;
+  bool complete = false;
+  absl::Status status;
+  while (status.ok() && reader->Read(&message)) {
+    switch (message.part_case()) {
+      case v1::RenderFrameResponse::kHeader:
+        status = assembler.AddHeader(message.header());
+        break;
+      case v1::RenderFrameResponse::kChunk:
+        status = assembler.AddChunk(message.chunk());
+        break;
+      case v1::RenderFrameResponse::kTrailer:
+        status = assembler.AddTrailer(message.trailer());
+        complete = status.ok();
+        break;
+      default:
+        break;  // a part that a later version of the service has added
+    }
+  }
+  if (!status.ok()) {
+    context.TryCancel();
+    reader->Finish();
+    return status;
+  }
+  status = FromGrpc(reader->Finish());
+  if (!status.ok()) {
+    return status;
+  }
+  if (!complete) {
+    return absl::DataLossError("the stream ended before the frame's trailer");
+  }
+  return assembler.Take();
+}
+
+absl::StatusOr<RenderedFrame> Client::Impl::RenderFrame(const v1::RenderFrameRequest& request) {
+  absl::StatusOr<RenderedFrame> frame;
+  absl::Status status =
+      Try(request.scene().particle_sha256(), options_.stop, [&](grpc::ClientContext& context) {
+        frame = RenderOnce(context, request);
+        return frame.status();
+      });
+  if (!status.ok()) {
+    return status;
+  }
+  return frame;
+}
+
+Client::Client(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+Client::Client(Client&&) noexcept = default;
+Client& Client::operator=(Client&&) noexcept = default;
+Client::~Client() = default;
+
+absl::StatusOr<Client> Client::Connect(const std::string& address, ClientOptions options) {
+  if (absl::Status status = CheckAddress(address); !status.ok()) {
+    return status;
+  }
+  return Client(std::make_unique<Impl>(address, std::move(options)));
+}
+
+absl::StatusOr<v1::GetServerInfoResponse> Client::GetServerInfo() {
+  return impl_->GetServerInfo(impl_->options().stop);
+}
+
+absl::StatusOr<std::vector<std::string>> Client::FindMissing(
+    const std::vector<std::string>& sha256) {
+  return impl_->FindMissing(sha256, "", impl_->options().stop);
+}
+
+absl::Status Client::Upload(const EncodedParticles& particles) {
+  return impl_->Upload(particles, particles.sha256, impl_->options().stop);
+}
+
+absl::Status Client::EnsureUploaded(const EncodedParticles& particles) {
+  return impl_->EnsureUploaded(particles, particles.sha256, impl_->options().stop);
+}
+
+absl::StatusOr<RenderedFrame> Client::RenderFrame(v1::RenderFrameRequest request,
+                                                  const EncodedParticles* particles) {
+  if (particles == nullptr) {
+    return impl_->RenderFrame(request);
+  }
+  request.mutable_scene()->set_particle_sha256(particles->sha256);
+  for (bool again = false;; again = true) {
+    if (absl::Status status = EnsureUploaded(*particles); !status.ok()) {
+      return status;
+    }
+    auto frame = impl_->RenderFrame(request);
+    if (again || frame.status().code() != absl::StatusCode::kNotFound) {
+      return frame;
+    }
+  }
+}
+
+absl::Status Client::RenderSequence(uint64_t count, const FrameSource& source,
+                                    const FrameSink& sink, uint32_t read_ahead) {
+  return impl_->RenderSequence(count, source, sink, read_ahead);
+}
+
+}  // namespace halflight::client

@@ -1,0 +1,90 @@
+// The client of the render service: one method a call, with deadlines, retries and checks.
+// Leaves out files (readers/), what a request should say (framing.h) and starting a server
+// (local_server.h).
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <stop_token>
+#include <string>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "client/frame_assembler.h"
+#include "client/particles.h"
+#include "halflight/v1/service.pb.h"
+
+namespace halflight::client {
+
+struct ClientOptions {
+  // The longest that a call may take, retries included; of a sequence, the longest without a sign
+  // of life. 0: for ever.
+  std::chrono::milliseconds timeout{600000};
+  // Tries of one call before its error is returned.
+  int max_attempts = 6;
+  // The first wait between tries; it doubles from one to the next.
+  std::chrono::milliseconds first_backoff{100};
+  // When requested, calls end with CANCELLED at once.
+  std::stop_token stop;
+};
+
+// One frame of a sequence, before it is sent.
+struct SequenceFrame {
+  v1::RenderFrameRequest request;
+  // Uploaded where the server lacks them; the request then names them.
+  std::optional<EncodedParticles> particles;
+};
+
+// Gives frame `index`. Called from other threads than the caller's too, but from one at a time, in
+// ascending order; again for frames that have to be sent again.
+using FrameSource = std::function<absl::StatusOr<SequenceFrame>(uint64_t index)>;
+// Takes frame `index`; called on the caller's thread, in ascending order, once each.
+using FrameSink = std::function<absl::Status(uint64_t index, RenderedFrame frame)>;
+
+// May be used from several threads at once. Errors are those that service.proto lists, and
+// DATA_LOSS where what came does not fit together; UNAVAILABLE and RESOURCE_EXHAUSTED are returned
+// only after max_attempts.
+class Client {
+ public:
+  // `address` is host:port or unix:path; InvalidArgument for anything else. Does not wait for the
+  // server: the first call does.
+  static absl::StatusOr<Client> Connect(const std::string& address, ClientOptions options = {});
+  Client(Client&&) noexcept;
+  Client& operator=(Client&&) noexcept;
+  ~Client();
+
+  absl::StatusOr<v1::GetServerInfoResponse> GetServerInfo();
+
+  // Those of the named sets that the server lacks.
+  absl::StatusOr<std::vector<std::string>> FindMissing(const std::vector<std::string>& sha256);
+
+  // Sends a set, whether or not the server has it.
+  absl::Status Upload(const EncodedParticles& particles);
+
+  // Sends a set where the server lacks it. InvalidArgument where it is larger than the server
+  // takes.
+  absl::Status EnsureUploaded(const EncodedParticles& particles);
+
+  // Renders one frame. With `particles` they are uploaded first and named in the request; where the
+  // server has dropped them in between they are sent once more.
+  absl::StatusOr<RenderedFrame> RenderFrame(v1::RenderFrameRequest request,
+                                            const EncodedParticles* particles = nullptr);
+
+  // Renders `count` frames over one stream. At most `read_ahead` frames are sent beyond the one
+  // that is awaited. A stream that breaks off for a reason worth a retry goes on where it stopped.
+  // An error of `source` is returned after all frames before it were taken; one of `sink` at once.
+  // Where the server refuses a frame the message starts with "frame N: ", N counted from 0.
+  absl::Status RenderSequence(uint64_t count, const FrameSource& source, const FrameSink& sink,
+                              uint32_t read_ahead = 4);
+
+ private:
+  class Impl;
+  explicit Client(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace halflight::client

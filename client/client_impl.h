@@ -1,0 +1,66 @@
+// What client.cpp and sequence.cpp share: the channel, and how a call is tried.
+// Not for users of the library.
+#pragma once
+
+#include <grpcpp/grpcpp.h>
+
+#include <mutex>
+#include <string>
+#include <string_view>
+
+#include "client/client.h"
+#include "client/retry.h"
+#include "halflight/v1/service.grpc.pb.h"
+
+namespace halflight::client {
+
+using Clock = std::chrono::system_clock;  // what gRPC takes deadlines in
+
+absl::Status FromGrpc(const grpc::Status& status);
+
+// How long the server asks to wait, as gRPC's convention for retries has it.
+std::optional<std::chrono::milliseconds> RetryHint(const grpc::ClientContext& context);
+
+class Client::Impl {
+ public:
+  Impl(const std::string& address, ClientOptions options);
+
+  // Each does what the method of Client does, ending early when `stop` is requested. `route` is the
+  // particle set by which a proxy may choose a server, so that a frame goes where its particles
+  // went; empty: none.
+  absl::StatusOr<v1::GetServerInfoResponse> GetServerInfo(const std::stop_token& stop);
+  absl::StatusOr<std::vector<std::string>> FindMissing(const std::vector<std::string>& sha256,
+                                                       std::string_view route,
+                                                       const std::stop_token& stop);
+  absl::Status Upload(const EncodedParticles& particles, std::string_view route,
+                      const std::stop_token& stop);
+  absl::Status EnsureUploaded(const EncodedParticles& particles, std::string_view route,
+                              const std::stop_token& stop);
+  absl::StatusOr<RenderedFrame> RenderFrame(const v1::RenderFrameRequest& request);
+  absl::Status RenderSequence(uint64_t count, const FrameSource& source, const FrameSink& sink,
+                              uint32_t read_ahead);
+
+  [[nodiscard]] const ClientOptions& options() const { return options_; }
+
+ private:
+  // Calls `attempt` with a fresh context until it succeeds, fails for good, or time or tries are
+  // used up.
+  absl::Status Try(std::string_view route, const std::stop_token& stop,
+                   const std::function<absl::Status(grpc::ClientContext&)>& attempt);
+  absl::Status UploadOnce(grpc::ClientContext& context, const EncodedParticles& particles);
+  absl::StatusOr<RenderedFrame> RenderOnce(grpc::ClientContext& context,
+                                           const v1::RenderFrameRequest& request);
+  // Limits of the server, asked for once.
+  absl::StatusOr<v1::ServerLimits> Limits(const std::stop_token& stop);
+
+  std::string address_;
+  ClientOptions options_;
+  std::unique_ptr<v1::RenderService::Stub> stub_;
+  std::mutex limits_mutex_;
+  std::optional<v1::ServerLimits> limits_;
+};
+
+// Adds the metadata that names the particle set; nothing for an empty route.
+void SetRoute(grpc::ClientContext& context, std::string_view route);
+
+}  // namespace halflight::client

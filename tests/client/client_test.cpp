@@ -1,0 +1,209 @@
+// The client against a service in this process: retries, uploads, checks of what comes back.
+#include "client/client.h"
+
+#include <gmock/gmock.h>
+
+#include <thread>
+
+#include "halflight/sha256.h"
+#include "tests/client/fake_service.h"
+#include "tests/client/test_bytes.h"
+
+namespace halflight::client {
+namespace {
+
+using absl::StatusCode;
+using testing::ElementsAre;
+
+const grpc::Status kUnavailable(grpc::StatusCode::UNAVAILABLE, "draining");
+const grpc::Status kExhausted(grpc::StatusCode::RESOURCE_EXHAUSTED, "queue is full");
+
+EncodedParticles SomeParticles(float seed, size_t count = 100) {
+  Particles particles;
+  particles.positions.assign(3 * count, seed);
+  return EncodeParticles(particles);
+}
+
+v1::RenderFrameRequest SomeRequest(int outputs = 2) {
+  v1::RenderFrameRequest request;
+  for (int i = 0; i < outputs; ++i) {
+    request.add_outputs()->set_kind(v1::OUTPUT_KIND_BEAUTY);
+  }
+  return request;
+}
+
+class ClientTest : public testing::Test {
+ protected:
+  Client Connect(ClientOptions options = {}) {
+    options.first_backoff = std::chrono::milliseconds(2);
+    return *Client::Connect(service_.address(), options);
+  }
+
+  FakeService service_;
+};
+
+TEST(Client, TakesAddressesOfTwoKinds) {
+  EXPECT_TRUE(Client::Connect("localhost:1").ok());
+  EXPECT_TRUE(Client::Connect("[::1]:65535").ok());
+  EXPECT_TRUE(Client::Connect("unix:/tmp/x").ok());
+  for (const char* address : {"", "localhost", "localhost:", ":1", "a:0", "a:65536", "unix:"}) {
+    ExpectError(Client::Connect(address).status(), StatusCode::kInvalidArgument,
+                {std::string("'") + address + "'", "host:port", "unix:path"});
+  }
+}
+
+TEST_F(ClientTest, UploadsThenRenders) {
+  const EncodedParticles particles = SomeParticles(1, 100000);
+  const auto frame = Connect().RenderFrame(SomeRequest(), &particles);
+  ASSERT_TRUE(frame.ok()) << frame.status();
+  v1::RenderFrameRequest sent = SomeRequest();
+  sent.mutable_scene()->set_particle_sha256(particles.sha256);
+  EXPECT_THAT(frame->outputs,
+              ElementsAre(FakeService::OutputBytes(sent, 0), FakeService::OutputBytes(sent, 1)));
+  EXPECT_EQ(frame->sha256[1], Sha256Of(frame->outputs[1]));
+  EXPECT_EQ(service_.largest_chunk, 262144U);
+  EXPECT_THAT(service_.routes, ElementsAre(ToHex(particles.sha256)));
+}
+
+TEST_F(ClientTest, DoesNotUploadWhatTheServerHas) {
+  const EncodedParticles particles = SomeParticles(1);
+  Client client = Connect();
+  ASSERT_TRUE(client.RenderFrame(SomeRequest(), &particles).ok());
+  ASSERT_TRUE(client.RenderFrame(SomeRequest(), &particles).ok());
+  EXPECT_EQ(service_.Calls("UploadParticles"), 1);
+  const auto missing = client.FindMissing({particles.sha256, std::string(32, 'x')});
+  ASSERT_TRUE(missing.ok());
+  EXPECT_THAT(*missing, ElementsAre(std::string(32, 'x')));
+}
+
+TEST_F(ClientTest, TriesAgainWhenTheServerIsBusy) {
+  for (const char* rpc :
+       {"GetServerInfo", "FindMissingParticles", "UploadParticles", "RenderFrame"}) {
+    service_.FailNext(rpc, {kUnavailable, kExhausted});
+  }
+  const EncodedParticles particles = SomeParticles(1);
+  const auto frame = Connect().RenderFrame(SomeRequest(), &particles);
+  ASSERT_TRUE(frame.ok()) << frame.status();
+  for (const char* rpc :
+       {"GetServerInfo", "FindMissingParticles", "UploadParticles", "RenderFrame"}) {
+    EXPECT_EQ(service_.Calls(rpc), 3) << rpc;
+  }
+}
+
+TEST_F(ClientTest, GivesUpAfterTheLastTry) {
+  service_.FailNext("GetServerInfo", std::vector(5, kUnavailable));
+  ClientOptions options;
+  options.max_attempts = 3;
+  ExpectError(Connect(options).GetServerInfo().status(), StatusCode::kUnavailable,
+              {"after 3 of 3 tries", "draining", service_.address()});
+  EXPECT_EQ(service_.Calls("GetServerInfo"), 3);
+}
+
+TEST_F(ClientTest, DoesNotRepeatWhatTheServerRefused) {
+  service_.FailNext("RenderFrame",
+                    {{grpc::StatusCode::INVALID_ARGUMENT, "scene.camera.width is 0"}});
+  const EncodedParticles particles = SomeParticles(1);
+  ExpectError(Connect().RenderFrame(SomeRequest(), &particles).status(),
+              StatusCode::kInvalidArgument, {"scene.camera.width is 0"});
+  EXPECT_EQ(service_.Calls("RenderFrame"), 1);
+}
+
+TEST_F(ClientTest, UploadsOnceMoreWhatTheServerDroppedInBetween) {
+  service_.evict_after_upload = 1;
+  const EncodedParticles particles = SomeParticles(1);
+  const auto frame = Connect().RenderFrame(SomeRequest(), &particles);
+  EXPECT_TRUE(frame.ok()) << frame.status();
+  EXPECT_EQ(service_.Calls("UploadParticles"), 2);
+  EXPECT_EQ(service_.Calls("RenderFrame"), 2);
+}
+
+TEST_F(ClientTest, UploadsOnlyOnceMore) {
+  service_.evict_after_upload = 9;
+  const EncodedParticles particles = SomeParticles(1);
+  ExpectError(Connect().RenderFrame(SomeRequest(), &particles).status(), StatusCode::kNotFound,
+              {"particle_sha256"});
+  EXPECT_EQ(service_.Calls("UploadParticles"), 2);
+}
+
+TEST_F(ClientTest, RefusesToSendASetThatTheServerNeverTakes) {
+  service_.limits.set_max_particles(99);
+  const EncodedParticles particles = SomeParticles(1, 100);
+  ExpectError(Connect().EnsureUploaded(particles), StatusCode::kInvalidArgument,
+              {"100 particles", "at most 99"});
+  service_.limits.set_max_particles(0);
+  service_.limits.set_max_particle_bytes(1199);
+  ExpectError(Connect().EnsureUploaded(particles), StatusCode::kInvalidArgument,
+              {"1200 bytes", "at most 1199"});
+  EXPECT_EQ(service_.Calls("UploadParticles"), 0);
+}
+
+TEST_F(ClientTest, DetectsDamagedOutputs) {
+  struct Case {
+    const char* message;
+    std::function<void(v1::RenderSequenceResponse&)> tamper;
+  };
+  const EncodedParticles particles = SomeParticles(1);
+  Client client = Connect();
+  for (const Case& damage : {
+           Case{"SHA-256",
+                [](auto& m) {
+                  if (m.has_chunk()) (*m.mutable_chunk()->mutable_data())[7] ^= 1;
+                }},
+           Case{"offset",
+                [](auto& m) {
+                  if (m.has_chunk() && m.chunk().offset() > 0)
+                    m.mutable_chunk()->set_offset(262145);
+                }},
+           Case{"came before the trailer",
+                [](auto& m) {
+                  if (m.has_chunk() && m.chunk().output_index() == 1) m.clear_chunk();
+                }},
+           Case{"output 1",
+                [](auto& m) {
+                  if (m.has_chunk()) m.mutable_chunk()->set_output_index(1);
+                }},
+           Case{"before the frame's trailer",
+                [](auto& m) {
+                  if (m.has_trailer()) m.clear_trailer();
+                }},
+           Case{"before the frame's header",
+                [](auto& m) {
+                  if (m.has_header()) m.clear_header();
+                }},
+           Case{"1 digests, expected 2",
+                [](auto& m) {
+                  if (m.has_trailer()) m.mutable_trailer()->mutable_output_sha256()->RemoveLast();
+                }},
+       }) {
+    service_.tamper = damage.tamper;
+    ExpectError(client.RenderFrame(SomeRequest(), &particles).status(), StatusCode::kDataLoss,
+                {damage.message});
+  }
+}
+
+TEST_F(ClientTest, EndsAtItsDeadline) {
+  service_.FailNext("GetServerInfo", std::vector(1000, kUnavailable));
+  ClientOptions options;
+  options.max_attempts = 1000;
+  options.timeout = std::chrono::milliseconds(200);
+  const auto start = std::chrono::steady_clock::now();
+  EXPECT_FALSE(Connect(options).GetServerInfo().ok());
+  EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(5));
+}
+
+TEST_F(ClientTest, EndsWhenStopped) {
+  service_.FailNext("GetServerInfo", std::vector(1000, kUnavailable));
+  std::stop_source stop;
+  ClientOptions options;
+  options.max_attempts = 1000;
+  options.stop = stop.get_token();
+  Client client = Connect(options);
+  const std::jthread stopper([&stop] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    stop.request_stop();
+  });
+  EXPECT_EQ(client.GetServerInfo().status().code(), StatusCode::kCancelled);
+}
+
+}  // namespace
+}  // namespace halflight::client
