@@ -62,7 +62,6 @@ absl::Status FramePipeline::Admit() {
 
 absl::Status FramePipeline::Submit(FrameJob job, std::stop_token stop, Done done) {
   if (absl::Status status = Admit(); !status.ok()) {
-    spdlog::warn(RefusalLogLine(job.request_id, status));
     return status;
   }
   if (job.request_id.empty()) {
@@ -82,7 +81,6 @@ absl::Status FramePipeline::Submit(FrameJob job, std::stop_token stop, Done done
                                          OnRendered(flight, std::move(result));
                                        });
   if (!status.ok()) {
-    spdlog::warn(FrameLogLine(flight->job, {}, status));
     const std::lock_guard lock(mutex_);
     --queued_;
     --flights_;
@@ -154,7 +152,7 @@ void FramePipeline::Complete(const std::shared_ptr<Flight>& flight) {
   }
   timings.push_back({"total", Milliseconds(now - flight->submitted)});
 
-  absl::StatusOr<std::shared_ptr<const EncodedFrame>> answer = flight->outcome;
+  absl::StatusOr<std::shared_ptr<const EncodedFrame>> answer = nullptr;
   if (flight->outcome.ok()) {
     auto frame = std::make_shared<EncodedFrame>();
     frame->header = DescribeFrame(flight->job, flight->rendered, flight->encoded, timings,
@@ -164,6 +162,8 @@ void FramePipeline::Complete(const std::shared_ptr<Flight>& flight) {
       frame->trailer.add_output_sha256(flight->digests[i]);
     }
     answer = std::shared_ptr<const EncodedFrame>(std::move(frame));
+  } else {
+    answer = flight->outcome;
   }
   // Pixels go before the answer does: a slow reader shall hold the encoded bytes only.
   flight->rendered = {};

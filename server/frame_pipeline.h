@@ -31,7 +31,7 @@ struct EncodedFrame {
 struct PipelineOptions {
   uint32_t max_queued_frames = 64;  // accepted and not yet encoded
   int encode_threads = 1;
-  std::string server_version;
+  std::string server_version = "unknown";
   // What makes bytes of pixels; any thread.
   std::function<absl::StatusOr<EncodedImage>(const Image&, ImageKind, LightQuantity,
                                              const EncodeSettings&, const ImageMetadata&)>

@@ -11,6 +11,7 @@ namespace halflight {
 
 void RenderFrameHandler::Start(const v1::RenderFrameRequest& request) {
   if (const absl::Status status = Submit(request); !status.ok()) {
+    spdlog::info(RefusalLogLine(request.request_id(), status));
     sink_.Finish(status);
   }
 }
@@ -18,7 +19,6 @@ void RenderFrameHandler::Start(const v1::RenderFrameRequest& request) {
 absl::Status RenderFrameHandler::Submit(const v1::RenderFrameRequest& request) {
   auto job = ConvertRequest(request, backend_.store, backend_.limits);
   if (!job.ok()) {
-    spdlog::info(RefusalLogLine(request.request_id(), job.status()));
     return job.status();
   }
   return backend_.pipeline.Submit(

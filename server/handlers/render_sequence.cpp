@@ -1,5 +1,7 @@
 #include "server/handlers/render_sequence.h"
 
+#include <algorithm>
+#include <iterator>
 #include <string>
 #include <utility>
 
@@ -21,35 +23,55 @@ absl::Status InFrame(uint64_t index, const absl::Status& status) {
 }  // namespace
 
 void RenderSequenceHandler::OnRequest(const v1::RenderSequenceRequest& request) {
-  auto slot = std::make_shared<Slot>();
-  slot->index = next_index_++;
-  {
-    const std::lock_guard lock(mutex_);
-    slots_.push_back(slot);
-  }
-  const absl::Status status = Submit(request.frame(), slot);
+  auto job = state_.Next(request.frame(), backend_);
   {
     const std::lock_guard lock(mutex_);
     reading_ = false;
-    if (!status.ok()) {
-      slot->result = status;
-      requests_ended_ = true;
+    slots_.push_back(std::make_shared<Slot>());
+    slots_.back()->index = next_index_++;
+    if (job.ok()) {
+      waiting_ = *std::move(job);
+      may_submit_ = true;
+    } else {
+      Refuse(*slots_.back(), request.frame().request_id(), job.status());
     }
   }
   Advance();
 }
 
-absl::Status RenderSequenceHandler::Submit(const v1::RenderFrameRequest& request,
-                                           const std::shared_ptr<Slot>& slot) {
-  auto job = state_.Next(request, backend_);
-  if (!job.ok()) {
-    spdlog::info(RefusalLogLine(request.request_id(), job.status()));
-    return job.status();
+// Under the mutex. The stream ends with this frame.
+void RenderSequenceHandler::Refuse(Slot& slot, const std::string& request_id,
+                                   const absl::Status& status) {
+  spdlog::info(RefusalLogLine(request_id, status));
+  slot.result = status;
+  requests_ended_ = true;
+}
+
+// Under the mutex.
+bool RenderSequenceHandler::HasFramesUnderWay() const {
+  return std::any_of(slots_.begin(), std::prev(slots_.end()),
+                     [](const auto& slot) { return !slot->result.has_value(); });
+}
+
+// By the thread that advances: hands the frame that waits to the pipeline.
+void RenderSequenceHandler::Submit() {
+  std::unique_lock lock(mutex_);
+  const std::shared_ptr<Slot> slot = slots_.back();
+  FrameJob job = *waiting_;
+  lock.unlock();
+  const absl::Status status = backend_.pipeline.Submit(
+      std::move(job), stop_.get_token(), [self = shared_from_this(), slot](FrameOrError frame) {
+        self->OnFrame(*slot, std::move(frame));
+      });
+  lock.lock();
+  // With frames of its own in the queue, or just out of it, the stream tries again.
+  if (absl::IsResourceExhausted(status) && (HasFramesUnderWay() || may_submit_)) {
+    return;
   }
-  return backend_.pipeline.Submit(*std::move(job), stop_.get_token(),
-                                  [self = shared_from_this(), slot](FrameOrError frame) {
-                                    self->OnFrame(*slot, std::move(frame));
-                                  });
+  if (!status.ok()) {
+    Refuse(*slot, waiting_->request_id, status);
+  }
+  waiting_.reset();
 }
 
 void RenderSequenceHandler::OnEndOfRequests() {
@@ -65,6 +87,7 @@ void RenderSequenceHandler::OnFrame(Slot& slot, FrameOrError result) {
   {
     const std::lock_guard lock(mutex_);
     slot.result = std::move(result);
+    may_submit_ = true;
   }
   Advance();
 }
@@ -110,6 +133,9 @@ void RenderSequenceHandler::Advance() {
     switch (step) {
       case Step::kNothing:
         return;
+      case Step::kSubmit:
+        Submit();
+        break;
       case Step::kRead:
         sink_.Read();
         break;
@@ -126,7 +152,7 @@ void RenderSequenceHandler::Advance() {
   }
 }
 
-// Under the mutex: what to do with the sink now.
+// Under the mutex: what to do now.
 RenderSequenceHandler::Step RenderSequenceHandler::NextStep() {
   if (finished_) {
     return Step::kNothing;
@@ -158,6 +184,9 @@ RenderSequenceHandler::Step RenderSequenceHandler::NextStep() {
     }
     finished_ = true;
     return Step::kFinish;
+  }
+  if (waiting_.has_value()) {
+    return std::exchange(may_submit_, false) ? Step::kSubmit : Step::kNothing;
   }
   if (!reading_ && !requests_ended_ && slots_.size() < kFramesAhead) {
     reading_ = true;

@@ -9,6 +9,7 @@
 #include <mutex>
 #include <optional>
 #include <stop_token>
+#include <string>
 
 #include "halflight/v1/service.pb.h"
 #include "server/handlers/backend.h"
@@ -28,6 +29,8 @@ inline constexpr size_t kFramesAhead = 4;
 // Reads, writes and frames complete on different threads. Each notes what happened under the mutex
 // and calls Advance, which lets one thread at a time do what follows, without the mutex: so the
 // sink is never called by two at once, and never after Finish.
+//
+// A stream never fails because its own frames fill the queue: the next one then waits for them.
 class RenderSequenceHandler : public std::enable_shared_from_this<RenderSequenceHandler> {
  public:
   RenderSequenceHandler(const Backend& backend, DuplexSink<v1::RenderSequenceResponse>& sink)
@@ -50,9 +53,11 @@ class RenderSequenceHandler : public std::enable_shared_from_this<RenderSequence
     std::optional<FrameOrError> result;
   };
 
-  enum class Step : uint8_t { kNothing, kRead, kWrite, kFinish };
+  enum class Step : uint8_t { kNothing, kSubmit, kRead, kWrite, kFinish };
 
-  absl::Status Submit(const v1::RenderFrameRequest& request, const std::shared_ptr<Slot>& slot);
+  void Refuse(Slot& slot, const std::string& request_id, const absl::Status& status);
+  void Submit();
+  [[nodiscard]] bool HasFramesUnderWay() const;
   void OnFrame(Slot& slot, FrameOrError result);
   void End(const absl::Status& status);
   void Advance();
@@ -68,6 +73,8 @@ class RenderSequenceHandler : public std::enable_shared_from_this<RenderSequence
 
   std::mutex mutex_;
   std::deque<std::shared_ptr<Slot>> slots_;  // in order; the first is being sent or waited for
+  std::optional<FrameJob> waiting_;          // of the last slot, to be submitted
+  bool may_submit_ = false;                  // there may be room for it in the queue
   std::optional<FrameMessages> messages_;    // of the first slot
   v1::RenderSequenceResponse message_;
   std::optional<absl::Status> end_;  // what the call ends with
