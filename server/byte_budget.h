@@ -19,6 +19,8 @@ class ByteBudget {
     ~Share() { Release(); }
     Share(const Share&) = delete;
     Share& operator=(const Share&) = delete;
+    Share(Share&&) = delete;
+    Share& operator=(Share&&) = delete;
 
     // False, and nothing changed, where the budget has less than this left.
     [[nodiscard]] bool Grow(uint64_t bytes) {

@@ -12,6 +12,7 @@
 #include "server/convert/describe.h"
 #include "server/frame_log.h"
 #include "server/retry_hint.h"
+#include "server/status_text.h"
 
 namespace halflight {
 namespace {
@@ -127,9 +128,7 @@ void FramePipeline::EncodeOutput(const std::shared_ptr<Flight>& flight, size_t i
   } else {
     const std::lock_guard lock(flight->mutex);
     if (flight->outcome.ok()) {
-      flight->outcome = absl::Status(
-          encoded.status().code(),
-          fmt::format("outputs[{}]: {}", index, std::string(encoded.status().message())));
+      flight->outcome = Prefixed(fmt::format("outputs[{}]: ", index), encoded.status());
     }
   }
   if (--flight->outputs_left == 0) {

@@ -48,6 +48,8 @@ class FramePipeline {
   ~FramePipeline();
   FramePipeline(const FramePipeline&) = delete;
   FramePipeline& operator=(const FramePipeline&) = delete;
+  FramePipeline(FramePipeline&&) = delete;
+  FramePipeline& operator=(FramePipeline&&) = delete;
 
   // Queues a frame; makes a request_id where the job has none. When it returns OK, `done` is called
   // exactly once, on a thread of the pipeline, never of the engine: with the frame, with an error,

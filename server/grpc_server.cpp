@@ -14,6 +14,7 @@
 #include <spdlog/spdlog.h>
 
 #include "server/render_service.h"
+#include "server/status_text.h"
 #include "server/unix_socket.h"
 
 namespace halflight {
@@ -62,8 +63,7 @@ absl::StatusOr<std::unique_ptr<GrpcServer>> GrpcServer::Start(
   for (size_t i = 0; i < addresses.size(); ++i) {
     if (const std::string path = SocketPath(addresses[i]); !path.empty()) {
       if (const absl::Status status = RemoveStaleSocket(path); !status.ok()) {
-        return absl::Status(status.code(), fmt::format("--address {}: {}", addresses[i],
-                                                       std::string(status.message())));
+        return Prefixed(fmt::format("--address {}: ", addresses[i]), status);
       }
     }
     builder.AddListeningPort(addresses[i], grpc::InsecureServerCredentials(), &ports[i]);

@@ -22,6 +22,8 @@ class GrpcServer {
   ~GrpcServer();
   GrpcServer(const GrpcServer&) = delete;
   GrpcServer& operator=(const GrpcServer&) = delete;
+  GrpcServer(GrpcServer&&) = delete;
+  GrpcServer& operator=(GrpcServer&&) = delete;
 
   // The addresses with the ports that were taken for 0.
   [[nodiscard]] const std::vector<std::string>& addresses() const { return addresses_; }

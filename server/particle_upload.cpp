@@ -7,6 +7,7 @@
 
 #include "server/convert/field_checks.h"
 #include "server/retry_hint.h"
+#include "server/status_text.h"
 
 namespace halflight {
 
@@ -114,7 +115,7 @@ absl::StatusOr<NamedParticles> BuildInlineParticles(const v1::InlineParticles& p
   }
   ParticleAssembler assembler(particles.layout(), *bytes);
   if (const absl::Status status = assembler.Append(particles.payload()); !status.ok()) {
-    return absl::Status(status.code(), fmt::format("{}.{}", path, std::string(status.message())));
+    return Prefixed(path + ".", status);
   }
   return assembler.Finish();
 }

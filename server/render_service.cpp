@@ -37,6 +37,8 @@ class CallToken {
   ~CallToken() { --count_.active; }
   CallToken(const CallToken&) = delete;
   CallToken& operator=(const CallToken&) = delete;
+  CallToken(CallToken&&) = delete;
+  CallToken& operator=(CallToken&&) = delete;
 
   [[nodiscard]] bool refused() const { return count_.draining; }
 

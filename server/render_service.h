@@ -19,6 +19,8 @@ class RenderService {
   ~RenderService();
   RenderService(const RenderService&) = delete;
   RenderService& operator=(const RenderService&) = delete;
+  RenderService(RenderService&&) = delete;
+  RenderService& operator=(RenderService&&) = delete;
 
   // What a gRPC server registers.
   grpc::Service& grpc_service();

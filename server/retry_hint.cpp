@@ -25,7 +25,8 @@ absl::Status WithRetryHint(absl::Status status) {
 std::optional<std::chrono::milliseconds> RetryHint(const absl::Status& status) {
   const absl::optional<absl::Cord> payload = status.GetPayload(kPayloadName);
   int milliseconds = 0;
-  if (!payload.has_value() || !absl::SimpleAtoi(std::string(*payload), &milliseconds)) {
+  if (!payload.has_value() ||
+      !absl::SimpleAtoi(static_cast<std::string>(*payload), &milliseconds)) {
     return std::nullopt;
   }
   return std::chrono::milliseconds(milliseconds);

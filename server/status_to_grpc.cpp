@@ -4,6 +4,7 @@
 #include <string>
 
 #include "server/retry_hint.h"
+#include "server/status_text.h"
 
 namespace halflight {
 
@@ -19,7 +20,7 @@ grpc::Status ToGrpc(const absl::Status& status, grpc::CallbackServerContext& con
   if (const auto hint = RetryHint(status)) {
     context.AddTrailingMetadata("grpc-retry-pushback-ms", std::to_string(hint->count()));
   }
-  return {static_cast<grpc::StatusCode>(status.code()), std::string(status.message())};
+  return {static_cast<grpc::StatusCode>(status.code()), MessageOf(status)};
 }
 
 }  // namespace halflight

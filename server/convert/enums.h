@@ -21,6 +21,9 @@ struct EnumRow {
   Proto proto;
   Domain domain;
 };
+// Clang before 17 does not deduce aggregates by itself.
+template <typename Proto, typename Domain>
+EnumRow(Proto, Domain) -> EnumRow<Proto, Domain>;
 
 inline constexpr std::array kProfiles = {
     EnumRow{v1::PROFILE_SOFT, Profile::kSoft},

@@ -9,18 +9,9 @@
 #include <spdlog/spdlog.h>
 
 #include "server/frame_log.h"
-#include "server/retry_hint.h"
+#include "server/status_text.h"
 
 namespace halflight {
-namespace {
-
-absl::Status InFrame(uint64_t index, const absl::Status& status) {
-  const absl::Status named(status.code(),
-                           fmt::format("frame {}: {}", index, std::string(status.message())));
-  return RetryHint(status).has_value() ? WithRetryHint(named) : named;
-}
-
-}  // namespace
 
 void RenderSequenceHandler::OnRequest(const v1::RenderSequenceRequest& request) {
   auto job = state_.Next(request.frame(), backend_);
@@ -160,7 +151,7 @@ RenderSequenceHandler::Step RenderSequenceHandler::NextStep() {
   if (!end_.has_value() && !writing_ && !slots_.empty() && slots_.front()->result.has_value()) {
     const Slot& first = *slots_.front();
     if (!first.result->ok()) {
-      End(InFrame(first.index, first.result->status()));
+      End(Prefixed(fmt::format("frame {}: ", first.index), first.result->status()));
     } else {
       if (!messages_.has_value()) {
         messages_.emplace(**first.result);

@@ -59,6 +59,8 @@ class Process {
   }
   Process(const Process&) = delete;
   Process& operator=(const Process&) = delete;
+  Process(Process&&) = delete;
+  Process& operator=(Process&&) = delete;
 
   void Signal(int signal) const { kill(pid_, signal); }
 
