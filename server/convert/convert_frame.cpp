@@ -1,0 +1,90 @@
+#include "server/convert/convert_frame.h"
+
+#include <algorithm>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "halflight/sha256.h"
+#include "server/convert/convert_scene.h"
+#include "server/convert/field_checks.h"
+#include "server/particle_upload.h"
+
+namespace halflight {
+namespace {
+
+constexpr size_t kMaxRequestIdBytes = 128;
+
+void CheckRequestId(const std::string& id, FieldChecks& checks) {
+  const std::string allowed =
+      fmt::format("at most {} bytes of printable ASCII", kMaxRequestIdBytes);
+  if (id.size() > kMaxRequestIdBytes) {
+    checks.Reject("request_id", fmt::format("{} bytes", id.size()), allowed);
+  }
+  const auto bad =
+      std::find_if(id.begin(), id.end(), [](unsigned char c) { return c < 0x20 || c > 0x7e; });
+  if (bad != id.end()) {
+    checks.Reject(
+        "request_id",
+        fmt::format("byte {:#04x} at {}", static_cast<unsigned char>(*bad), bad - id.begin()),
+        allowed);
+  }
+}
+
+}  // namespace
+
+absl::StatusOr<NamedParticles> ResolveParticles(const v1::Scene& scene, ParticleStore& store,
+                                                const ServerLimits& limits) {
+  switch (scene.particles_case()) {
+    case v1::Scene::kInlineParticles:
+      return BuildInlineParticles(scene.inline_particles(), limits);
+    case v1::Scene::kParticleSha256: {
+      const std::string& sha256 = scene.particle_sha256();
+      if (sha256.size() != kSha256Bytes) {
+        return FieldError("scene.particle_sha256", fmt::format("{} bytes", sha256.size()),
+                          fmt::format("{} bytes", kSha256Bytes));
+      }
+      auto set = store.Find(sha256);
+      if (set == nullptr) {
+        return absl::NotFoundError(fmt::format(
+            "scene.particle_sha256: {} is not held by this server (any more): upload it first",
+            ToHex(sha256)));
+      }
+      return NamedParticles{sha256, std::move(set)};
+    }
+    case v1::Scene::PARTICLES_NOT_SET:
+      break;
+  }
+  return FieldError("scene.particles", "unset", "particle_sha256 or inline_particles");
+}
+
+absl::StatusOr<FrameJob> ConvertFrame(const v1::RenderFrameRequest& request,
+                                      const NamedParticles& particles, const ServerLimits& limits) {
+  FieldChecks checks;
+  CheckRequestId(request.request_id(), checks);
+  FrameJob job;
+  job.request_id = request.request_id();
+  job.particle_sha256 = particles.sha256;
+  job.request.scene = ConvertScene(request.scene(), particles.set, limits, checks);
+  if (checks.ok()) {
+    OutputPlan plan = ConvertOutputs(request.outputs(), job.request.scene, limits, checks);
+    job.request.images = std::move(plan.images);
+    job.outputs = std::move(plan.outputs);
+    job.pixel_bytes = plan.pixel_bytes;
+  }
+  if (!checks.ok()) {
+    return checks.status();
+  }
+  return job;
+}
+
+absl::StatusOr<FrameJob> ConvertRequest(const v1::RenderFrameRequest& request, ParticleStore& store,
+                                        const ServerLimits& limits) {
+  const auto particles = ResolveParticles(request.scene(), store, limits);
+  if (!particles.ok()) {
+    return particles.status();
+  }
+  return ConvertFrame(request, *particles, limits);
+}
+
+}  // namespace halflight

@@ -1,0 +1,41 @@
+// From a request message to what the pipeline works on: the entry to all conversion. Valid requests
+// only come out of here; nothing behind it checks values again.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "halflight/v1/service.pb.h"
+#include "renderer/frame.h"
+#include "server/convert/convert_outputs.h"
+#include "server/limits.h"
+#include "server/particle_assembler.h"
+#include "server/particle_store.h"
+
+namespace halflight {
+
+// A frame to make.
+struct FrameJob {
+  std::string request_id;
+  std::string particle_sha256;
+  FrameRequest request;
+  std::vector<OutputJob> outputs;
+  uint64_t pixel_bytes = 0;  // of all outputs together, in 32-bit float, at most
+};
+
+// The particles that a scene names or carries. InvalidArgument; NotFound for a name that the store
+// does not hold; ResourceExhausted for inline particles over the limits.
+absl::StatusOr<NamedParticles> ResolveParticles(const v1::Scene& scene, ParticleStore& store,
+                                                const ServerLimits& limits);
+
+// InvalidArgument "<path of the field>: <value>, allowed: <allowed>" for the first field that is
+// wrong. The scene's own particles are not looked at: `particles` stand for them.
+absl::StatusOr<FrameJob> ConvertFrame(const v1::RenderFrameRequest& request,
+                                      const NamedParticles& particles, const ServerLimits& limits);
+
+// Both of the above, for a request that stands alone.
+absl::StatusOr<FrameJob> ConvertRequest(const v1::RenderFrameRequest& request, ParticleStore& store,
+                                        const ServerLimits& limits);
+
+}  // namespace halflight

@@ -1,0 +1,42 @@
+// The outputs asked for: which images they need and how each is encoded, with every check of their
+// settings. Knows nothing of pixels.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include <google/protobuf/repeated_ptr_field.h>
+
+#include "halflight/v1/frame.pb.h"
+#include "renderer/image.h"
+#include "renderer/scene.h"
+#include "server/convert/field_checks.h"
+#include "server/encode/encode.h"
+#include "server/limits.h"
+
+namespace halflight {
+
+// One output of a frame, defaults filled in.
+struct OutputJob {
+  ImageRequest shown;
+  size_t image = 0;  // which of FrameRequest::images; outputs that show the same share one
+  EncodeSettings encoding{ImageFormat::kPng8};
+};
+
+struct OutputPlan {
+  std::vector<OutputJob> outputs;  // in the request's order
+  std::vector<ImageRequest> images;
+  uint64_t pixel_bytes = 0;  // of all outputs together, in 32-bit float, at most
+};
+
+// The scene has passed its checks. Field paths start with "outputs".
+OutputPlan ConvertOutputs(const google::protobuf::RepeatedPtrField<v1::Output>& outputs,
+                          const Scene& scene, const ServerLimits& limits, FieldChecks& checks);
+
+// Whether the image shows a light's view of the particles, not the camera's.
+bool IsSeenFromLight(ImageKind kind);
+
+// The other way.
+v1::Output DescribeOutput(const OutputJob& job);
+
+}  // namespace halflight

@@ -1,0 +1,205 @@
+#include "server/convert/convert_scene.h"
+
+#include <algorithm>
+#include <string>
+#include <utility>
+
+#include <fmt/format.h>
+#include <glm/geometric.hpp>
+
+#include "server/convert/convert_camera.h"
+#include "server/convert/enums.h"
+#include "server/convert/geometry.h"
+
+namespace halflight {
+namespace {
+
+constexpr double kMaxSampling = 8.0;
+constexpr double kMaxBlurTexels = 64.0;
+
+glm::vec3 ConvertColor(const v1::Color& color, const std::string& field, FieldChecks& checks) {
+  return {checks.InRange(field + ".r", color.r(), kNotNegative),
+          checks.InRange(field + ".g", color.g(), kNotNegative),
+          checks.InRange(field + ".b", color.b(), kNotNegative)};
+}
+
+Sampling ConvertSampling(const v1::Sampling& sampling, FieldChecks& checks) {
+  const Interval rates{.low = 1.0, .high = kMaxSampling};
+  Sampling converted;
+  if (sampling.has_supersample()) {
+    converted.supersample = static_cast<int>(
+        checks.InRange("scene.sampling.supersample", sampling.supersample(), rates));
+  } else if (sampling.has_downsample()) {
+    converted.downsample =
+        static_cast<int>(checks.InRange("scene.sampling.downsample", sampling.downsample(), rates));
+  }
+  return converted;
+}
+
+Light ConvertLight(const v1::Light& light, const std::string& path, FieldChecks& checks) {
+  Light converted;
+  if (light.has_directional()) {
+    converted.kind = DirectionalLight{
+        ConvertDirection(light.directional().direction(), path + ".directional.direction", checks)};
+  } else if (light.has_point()) {
+    const std::string position = path + ".point.position";
+    if (!light.point().has_position()) {
+      checks.Reject(position, "unset", "a point");
+    }
+    converted.kind = PointLight{ConvertVector(light.point().position(), position, checks),
+                                light.point().inverse_square_falloff()};
+  } else {
+    checks.Reject(path + ".kind", "unset", "directional or point");
+  }
+  if (light.has_color()) {
+    converted.color = ConvertColor(light.color(), path + ".color", checks);
+  }
+  if (light.has_density_rgb()) {
+    converted.shadow_density = ConvertColor(light.density_rgb(), path + ".density_rgb", checks);
+  } else if (light.shadow_density_case() == v1::Light::kDensity) {
+    converted.shadow_density =
+        glm::vec3(checks.InRange(path + ".density", light.density(), kNotNegative));
+  }
+  return converted;
+}
+
+Material ConvertMaterial(const v1::Material& material, const ParticleSet& particles,
+                         FieldChecks& checks) {
+  const std::string path = "scene.material";
+  Material converted;
+  converted.profile =
+      FromProto(kProfiles, material.profile(), converted.profile, path + ".profile", checks);
+  if (material.has_radius()) {
+    if (particles.radii.empty()) {
+      converted.radius = checks.InRange(path + ".radius", material.radius(), kPositive);
+    }
+  } else if (particles.radii.empty() && particles.size() > 0) {
+    checks.Reject(path + ".radius", "unset", "> 0 where the particle set has no RADIUS");
+  }
+  if (material.has_opacity() && particles.opacities.empty()) {
+    converted.opacity =
+        checks.InRange(path + ".opacity", material.opacity(), {.low = 0.0, .high = 1.0});
+  }
+  if (material.has_albedo()) {
+    converted.albedo = ConvertColor(material.albedo(), path + ".albedo", checks);
+  }
+  if (material.has_emission() && particles.emissions.empty()) {
+    converted.emission = ConvertColor(material.emission(), path + ".emission", checks);
+  }
+  if (material.has_ambient()) {
+    converted.ambient = ConvertColor(material.ambient(), path + ".ambient", checks);
+  }
+  converted.phase_g =
+      checks.InRange(path + ".phase_g", material.phase_g(),
+                     {.low = -1.0, .high = 1.0, .open_low = true, .open_high = true});
+  converted.scattering_spread =
+      checks.InRange(path + ".scattering_spread", material.scattering_spread(), kNotNegative);
+  return converted;
+}
+
+ShadowSettings ConvertShadow(const v1::Shadow& shadow, const ServerLimits& limits,
+                             FieldChecks& checks) {
+  const std::string path = "scene.shadow";
+  ShadowSettings converted;
+  converted.technique =
+      FromProto(kTechniques, shadow.technique(), converted.technique, path + ".technique", checks);
+  const auto default_slices = std::min<uint32_t>(converted.slices, limits.max_slices);
+  converted.slices = static_cast<int>(
+      checks.InRangeOr(path + ".slices", shadow.slices(), default_slices,
+                       {.low = 1.0, .high = static_cast<double>(limits.max_slices)}));
+  converted.interpolate = !shadow.has_interpolate() || shadow.interpolate();
+  converted.spacing =
+      FromProto(kSpacings, shadow.spacing(), converted.spacing, path + ".spacing", checks);
+  const auto default_size =
+      std::min<uint32_t>(converted.light_buffer_size, limits.max_light_buffer_size);
+  converted.light_buffer_size = static_cast<int>(
+      checks.InRangeOr(path + ".light_buffer_size", shadow.light_buffer_size(), default_size,
+                       {.low = static_cast<double>(kMinLightBufferSize),
+                        .high = static_cast<double>(limits.max_light_buffer_size)}));
+  converted.blur_mode =
+      FromProto(kBlurModes, shadow.blur_mode(), converted.blur_mode, path + ".blur_mode", checks);
+  converted.blur_texels = shadow.blur_texels();
+  if (converted.blur_mode == BlurMode::kTexelsPerSlice) {
+    checks.InRange(path + ".blur_texels", converted.blur_texels,
+                   {.low = 0.0, .high = kMaxBlurTexels, .open_low = true});
+  } else if (converted.blur_texels != 0.0F) {
+    checks.Reject(path + ".blur_texels", fmt::format("{}", converted.blur_texels),
+                  "unset, unless blur_mode is BLUR_MODE_TEXELS_PER_SLICE");
+  }
+  return converted;
+}
+
+// Half-angle slicing looks at the particles from the light through one frustum, so that a light
+// among them would see only some.
+void CheckPointLights(const Scene& scene, FieldChecks& checks) {
+  for (size_t i = 0; i < scene.lights.size(); ++i) {
+    const auto* const point = std::get_if<PointLight>(&scene.lights[i].kind);
+    if (point == nullptr || !scene.lights[i].casts_shadows()) {
+      continue;
+    }
+    const auto bounds = Bounds(*scene.particles, scene.material.radius, scene.time_offset_s);
+    if (!bounds.has_value()) {
+      continue;
+    }
+    const double distance = glm::length(point->position - bounds->center);
+    if (!(distance > bounds->radius)) {
+      checks.Reject(fmt::format("scene.lighting.lights[{}].point.position", i),
+                    fmt::format("{} from the centre of the particles", distance),
+                    fmt::format("more than {}, the radius of their bounding sphere, for a light "
+                                "that casts shadows under SHADOW_TECHNIQUE_HALF_ANGLE",
+                                bounds->radius));
+    }
+  }
+}
+
+}  // namespace
+
+Scene ConvertScene(const v1::Scene& scene, std::shared_ptr<const ParticleSet> particles,
+                   const ServerLimits& limits, FieldChecks& checks) {
+  Scene converted;
+  converted.particles = std::move(particles);
+
+  // Each part by itself.
+  converted.time_offset_s = checks.InRange("scene.time_offset_s", scene.time_offset_s(), kFinite);
+  converted.sampling = ConvertSampling(scene.sampling(), checks);
+  if (!scene.has_camera()) {
+    checks.Reject("scene.camera", "unset", "a camera");
+  }
+  converted.camera = ConvertCamera(scene.camera(), converted.sampling.supersample, limits, checks);
+  const auto& lights = scene.lighting().lights();
+  if (static_cast<uint32_t>(lights.size()) > limits.max_lights) {
+    checks.Reject("scene.lighting.lights", fmt::format("{} lights", lights.size()),
+                  fmt::format("at most {}", limits.max_lights));
+  }
+  for (int i = 0; i < lights.size() && checks.ok(); ++i) {
+    converted.lights.push_back(
+        ConvertLight(lights[i], fmt::format("scene.lighting.lights[{}]", i), checks));
+  }
+  converted.material = ConvertMaterial(scene.material(), *converted.particles, checks);
+  converted.shadow = ConvertShadow(scene.shadow(), limits, checks);
+
+  // What the parts need of each other, once each is right.
+  if (converted.time_offset_s != 0.0 && converted.particles->velocities.empty() &&
+      converted.particles->size() > 0) {
+    checks.Reject("scene.time_offset_s", fmt::format("{}", converted.time_offset_s),
+                  "0 or unset where the particle set has no VELOCITY");
+  }
+  if (checks.ok() && converted.shadow.technique == ShadowTechniqueKind::kHalfAngle) {
+    CheckPointLights(converted, checks);
+  }
+  return converted;
+}
+
+v1::Shadow DescribeShadow(const ShadowSettings& shadow) {
+  v1::Shadow described;
+  described.set_technique(ToProto(kTechniques, shadow.technique));
+  described.set_slices(shadow.slices);
+  described.set_interpolate(shadow.interpolate);
+  described.set_spacing(ToProto(kSpacings, shadow.spacing));
+  described.set_light_buffer_size(shadow.light_buffer_size);
+  described.set_blur_mode(ToProto(kBlurModes, shadow.blur_mode));
+  described.set_blur_texels(shadow.blur_texels);
+  return described;
+}
+
+}  // namespace halflight

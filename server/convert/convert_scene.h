@@ -1,0 +1,22 @@
+// Scene messages to the renderer's scene: lights, material, shadow, sampling and what they need of
+// each other and of the particles. Leaves the camera to convert_camera.
+#pragma once
+
+#include <memory>
+
+#include "halflight/v1/scene.pb.h"
+#include "renderer/scene.h"
+#include "server/convert/field_checks.h"
+#include "server/limits.h"
+
+namespace halflight {
+
+// Defaults filled in. The result is only meaningful when the checks are passed; field paths start
+// with "scene". `particles` are what the message's `particles` stand for.
+Scene ConvertScene(const v1::Scene& scene, std::shared_ptr<const ParticleSet> particles,
+                   const ServerLimits& limits, FieldChecks& checks);
+
+// The other way: settings as used, for the frame's metadata.
+v1::Shadow DescribeShadow(const ShadowSettings& shadow);
+
+}  // namespace halflight

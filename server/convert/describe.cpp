@@ -1,0 +1,135 @@
+#include "server/convert/describe.h"
+
+#include <fmt/format.h>
+
+#include "halflight/sha256.h"
+#include "server/convert/convert_scene.h"
+#include "server/convert/geometry.h"
+
+namespace halflight {
+namespace {
+
+void Fill(v1::Matrix4& message, const glm::dmat4& matrix) {
+  for (int i = 0; i < 16; ++i) {
+    message.add_elements(matrix[i % 4][i / 4]);
+  }
+}
+
+v1::LightInfo DescribeLight(const LightReport& light) {
+  v1::LightInfo info;
+  info.set_casts_shadows(light.casts_shadows);
+  if (!light.casts_shadows) {
+    return info;
+  }
+  Fill(*info.mutable_world_to_light_texture(), light.light_texture_from_world);
+  Fill(*info.mutable_world_to_light_camera(), light.light_view_from_world);
+  info.mutable_slice_axis()->set_x(light.slice_axis.x);
+  info.mutable_slice_axis()->set_y(light.slice_axis.y);
+  info.mutable_slice_axis()->set_z(light.slice_axis.z);
+  info.set_slices(light.slices);
+  info.set_back_to_front(light.back_to_front);
+  return info;
+}
+
+v1::FrameMetadata DescribeMetadata(const FrameJob& job, const FrameResult& result,
+                                   const DeviceInfo& device, const std::string& server_version) {
+  const Scene& scene = job.request.scene;
+  v1::FrameMetadata metadata;
+  metadata.set_request_id(job.request_id);
+  metadata.set_gl_renderer(device.gl_renderer);
+  metadata.set_gl_version(device.gl_version);
+  metadata.set_particle_sha256(job.particle_sha256);
+  metadata.set_particle_count(scene.particles->size());
+  metadata.set_clamped_opacities(result.clamped_opacities);
+  *metadata.mutable_shadow() = DescribeShadow(scene.shadow);
+  Fill(*metadata.mutable_world_to_camera(), scene.camera.view_from_world);
+  Fill(*metadata.mutable_world_to_ndc(), NdcFromWorld(scene.camera));
+  for (const LightReport& light : result.lights) {
+    *metadata.add_lights() = DescribeLight(light);
+  }
+  metadata.set_server_version(server_version);
+  return metadata;
+}
+
+v1::OutputInfo DescribeEncoded(const OutputJob& output, const Image& image,
+                               const EncodedImage& encoded) {
+  v1::OutputInfo info;
+  *info.mutable_output() = DescribeOutput(output);
+  info.set_width(image.width);
+  info.set_height(image.height);
+  info.set_layers(image.layers);
+  for (const std::string& channel : image.channels) {
+    info.add_channels(channel);
+  }
+  info.set_media_type(encoded.media_type);
+  info.set_byte_size(encoded.bytes.size());
+  if (encoded.white_black.has_value()) {
+    info.set_white_value(encoded.white_black->first);
+    info.set_black_value(encoded.white_black->second);
+  }
+  return info;
+}
+
+}  // namespace
+
+ImageMetadata DescribeImage(const FrameJob& job, const FrameResult& result, const OutputJob& output,
+                            const DeviceInfo& device, const std::string& server_version) {
+  const Scene& scene = job.request.scene;
+  const v1::Shadow shadow = DescribeShadow(scene.shadow);
+  const v1::Output described = DescribeOutput(output);
+  ImageMetadata metadata;
+  metadata.text = {
+      {"halflight:particles", ToHex(job.particle_sha256)},
+      {"halflight:output", v1::OutputKind_Name(described.kind())},
+      {"halflight:technique", v1::ShadowTechnique_Name(shadow.technique())},
+      {"halflight:slices", fmt::format("{}", shadow.slices())},
+      {"halflight:interpolate", shadow.interpolate() ? "true" : "false"},
+      {"halflight:spacing", v1::SliceSpacing_Name(shadow.spacing())},
+      {"halflight:lightBufferSize", fmt::format("{}", shadow.light_buffer_size())},
+      {"halflight:blurMode", v1::BlurMode_Name(shadow.blur_mode())},
+      {"halflight:blurTexels", fmt::format("{}", shadow.blur_texels())},
+      {"halflight:renderer", device.gl_renderer},
+      {"halflight:version", server_version},
+  };
+  if (IsSeenFromLight(output.shown.kind)) {
+    const auto index = static_cast<size_t>(output.shown.light_index);
+    metadata.text.emplace_back("halflight:light", fmt::format("{}", index));
+    metadata.text.emplace_back("halflight:quantity", v1::LightQuantity_Name(described.quantity()));
+    if (index < result.lights.size()) {
+      metadata.world_to_camera = result.lights[index].light_view_from_world;
+      metadata.world_to_ndc = result.lights[index].light_texture_from_world;
+    }
+    return metadata;
+  }
+  metadata.world_to_camera = scene.camera.view_from_world;
+  metadata.world_to_ndc = NdcFromWorld(scene.camera);
+  metadata.data_window = scene.camera.window;
+  metadata.display_size = {scene.camera.width, scene.camera.height};
+  return metadata;
+}
+
+v1::FrameHeader DescribeFrame(const FrameJob& job, const FrameResult& result,
+                              const std::vector<EncodedImage>& encoded,
+                              const std::vector<StageTiming>& timings, const DeviceInfo& device,
+                              const std::string& server_version) {
+  v1::FrameHeader header;
+  *header.mutable_metadata() = DescribeMetadata(job, result, device, server_version);
+  for (const PlannedPass& pass : result.plan.passes) {
+    v1::PlannedPass& planned = *header.mutable_plan()->add_passes();
+    planned.set_name(pass.name);
+    planned.set_reason(pass.reason);
+    planned.set_count(pass.count);
+  }
+  for (const StageTiming& timing : timings) {
+    v1::StageTiming& stage = *header.add_timings();
+    stage.set_stage(timing.stage);
+    stage.set_milliseconds(timing.milliseconds);
+  }
+  for (size_t i = 0; i < encoded.size(); ++i) {
+    const OutputJob& output = job.outputs[i];
+    *header.add_outputs() = DescribeEncoded(output, result.images[output.image], encoded[i]);
+  }
+  return header;
+}
+
+}  // namespace halflight

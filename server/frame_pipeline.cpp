@@ -1,0 +1,180 @@
+#include "server/frame_pipeline.h"
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <utility>
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include "halflight/sha256.h"
+#include "server/convert/describe.h"
+#include "server/frame_log.h"
+#include "server/retry_hint.h"
+#include "server/status_text.h"
+
+namespace halflight {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double Milliseconds(Clock::duration duration) {
+  return std::chrono::duration<double, std::milli>(duration).count();
+}
+
+}  // namespace
+
+// Everything that flows between the stages of one frame. Each stage writes its own part; the last
+// output to be encoded sees all of it through `outputs_left`.
+struct FramePipeline::Flight {
+  FrameJob job;
+  std::stop_token stop;
+  Done done;
+  Clock::time_point submitted;
+
+  absl::Status outcome;  // of the render, or of the first output that failed, under `mutex`
+  FrameResult rendered;
+  Clock::time_point rendered_at;
+
+  std::mutex mutex;
+  std::atomic<size_t> outputs_left = 0;
+  std::vector<EncodedImage> encoded;
+  std::vector<std::string> digests;
+};
+
+FramePipeline::FramePipeline(FrameEngine& engine, PipelineOptions options)
+    : engine_(engine), options_(std::move(options)), workers_(options_.encode_threads) {}
+
+FramePipeline::~FramePipeline() {
+  std::unique_lock lock(mutex_);
+  idle_.wait(lock, [this] { return flights_ == 0; });
+}
+
+absl::Status FramePipeline::Admit() {
+  const std::lock_guard lock(mutex_);
+  if (queued_ >= options_.max_queued_frames) {
+    return BusyError(fmt::format("the queue is full ({} frames): retry later", queued_));
+  }
+  ++queued_;
+  ++flights_;
+  return absl::OkStatus();
+}
+
+absl::Status FramePipeline::Submit(FrameJob job, std::stop_token stop, Done done) {
+  if (absl::Status status = Admit(); !status.ok()) {
+    return status;
+  }
+  if (job.request_id.empty()) {
+    const std::lock_guard lock(mutex_);
+    job.request_id = fmt::format("server-{}", next_id_++);
+  }
+  auto flight = std::make_shared<Flight>();
+  flight->job = std::move(job);
+  flight->stop = stop;
+  flight->done = std::move(done);
+  flight->submitted = Clock::now();
+  // The scene is needed again when the frame is described.
+  FrameRequest request = flight->job.request;
+  absl::Status status = engine_.Submit(std::move(request), std::move(stop),
+                                       [this, flight](absl::StatusOr<FrameResult> result) {
+                                         // Only a hand-over: the engine's thread is for rendering.
+                                         OnRendered(flight, std::move(result));
+                                       });
+  if (!status.ok()) {
+    const std::lock_guard lock(mutex_);
+    --queued_;
+    --flights_;
+    idle_.notify_all();
+  }
+  return absl::IsResourceExhausted(status) ? WithRetryHint(status) : status;
+}
+
+void FramePipeline::OnRendered(const std::shared_ptr<Flight>& flight,
+                               absl::StatusOr<FrameResult> result) {
+  flight->rendered_at = Clock::now();
+  if (result.ok() && result->images.size() != flight->job.request.images.size()) {
+    result =
+        absl::InternalError(fmt::format("the renderer made {} images of {}", result->images.size(),
+                                        flight->job.request.images.size()));
+  }
+  if (!result.ok()) {
+    flight->outcome = result.status();
+    workers_.Post([this, flight] { Complete(flight); });
+    return;
+  }
+  flight->rendered = *std::move(result);
+  const size_t outputs = flight->job.outputs.size();
+  flight->encoded.resize(outputs);
+  flight->digests.resize(outputs);
+  flight->outputs_left = outputs;
+  for (size_t i = 0; i < outputs; ++i) {
+    workers_.Post([this, flight, i] { EncodeOutput(flight, i); });
+  }
+}
+
+void FramePipeline::EncodeOutput(const std::shared_ptr<Flight>& flight, size_t index) {
+  const OutputJob& output = flight->job.outputs[index];
+  absl::StatusOr<EncodedImage> encoded = absl::CancelledError("the call was cancelled");
+  if (!flight->stop.stop_requested()) {
+    encoded = options_.encode(flight->rendered.images[output.image], output.shown.kind,
+                              output.shown.quantity, output.encoding,
+                              DescribeImage(flight->job, flight->rendered, output, engine_.device(),
+                                            options_.server_version));
+  }
+  if (encoded.ok()) {
+    flight->digests[index] = Sha256Of(encoded->bytes);
+    flight->encoded[index] = *std::move(encoded);
+  } else {
+    const std::lock_guard lock(flight->mutex);
+    if (flight->outcome.ok()) {
+      flight->outcome = Prefixed(fmt::format("outputs[{}]: ", index), encoded.status());
+    }
+  }
+  if (--flight->outputs_left == 0) {
+    Complete(flight);
+  }
+}
+
+void FramePipeline::Complete(const std::shared_ptr<Flight>& flight) {
+  const auto now = Clock::now();
+  std::vector<StageTiming> timings;
+  if (flight->outcome.ok()) {
+    // The engine tells how long it worked; what is left of the time until then was waiting.
+    timings = std::move(flight->rendered.timings);
+    double waited = Milliseconds(flight->rendered_at - flight->submitted);
+    for (const StageTiming& stage : timings) {
+      waited -= stage.milliseconds;
+    }
+    timings.insert(timings.begin(), {"queue", std::max(0.0, waited)});
+    timings.push_back({"encode", Milliseconds(now - flight->rendered_at)});
+  }
+  timings.push_back({"total", Milliseconds(now - flight->submitted)});
+
+  absl::StatusOr<std::shared_ptr<const EncodedFrame>> answer = nullptr;
+  if (flight->outcome.ok()) {
+    auto frame = std::make_shared<EncodedFrame>();
+    frame->header = DescribeFrame(flight->job, flight->rendered, flight->encoded, timings,
+                                  engine_.device(), options_.server_version);
+    for (size_t i = 0; i < flight->encoded.size(); ++i) {
+      frame->outputs.push_back(std::move(flight->encoded[i].bytes));
+      frame->trailer.add_output_sha256(flight->digests[i]);
+    }
+    answer = std::shared_ptr<const EncodedFrame>(std::move(frame));
+  } else {
+    answer = flight->outcome;
+  }
+  // Pixels go before the answer does: a slow reader shall hold the encoded bytes only.
+  flight->rendered = {};
+  spdlog::info(FrameLogLine(flight->job, timings, flight->outcome));
+  {
+    const std::lock_guard lock(mutex_);
+    --queued_;
+  }
+  std::exchange(flight->done, nullptr)(std::move(answer));
+  const std::lock_guard lock(mutex_);
+  --flights_;
+  idle_.notify_all();
+}
+
+}  // namespace halflight

@@ -1,0 +1,39 @@
+#include "server/handlers/get_server_info.h"
+
+#include "server/convert/enums.h"
+
+namespace halflight {
+
+v1::GetServerInfoResponse GetServerInfo(const Backend& backend) {
+  v1::GetServerInfoResponse response;
+  response.set_server_version(backend.server_version);
+  response.set_gl_renderer(backend.device.gl_renderer);
+  response.set_gl_version(backend.device.gl_version);
+
+  const ServerLimits& limits = backend.limits;
+  v1::ServerLimits& told = *response.mutable_limits();
+  told.set_max_particles(limits.max_particles);
+  told.set_max_particle_bytes(limits.max_particle_bytes);
+  told.set_max_cache_bytes(limits.max_cache_bytes);
+  told.set_max_image_size(limits.max_image_size);
+  told.set_max_light_buffer_size(limits.max_light_buffer_size);
+  told.set_max_slices(limits.max_slices);
+  told.set_max_lights(limits.max_lights);
+  told.set_max_outputs(limits.max_outputs);
+  told.set_max_output_bytes(limits.max_output_bytes);
+  told.set_max_message_bytes(limits.max_message_bytes);
+  told.set_max_queued_frames(limits.max_queued_frames);
+
+  for (const auto& row : kTechniques) {
+    response.add_techniques(row.proto);
+  }
+  for (const auto& row : kOutputKinds) {
+    response.add_output_kinds(row.proto);
+  }
+  for (const auto& row : kFormats) {
+    response.add_formats(row.proto);
+  }
+  return response;
+}
+
+}  // namespace halflight

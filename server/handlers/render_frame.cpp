@@ -1,0 +1,54 @@
+#include "server/handlers/render_frame.h"
+
+#include <utility>
+
+#include <spdlog/spdlog.h>
+
+#include "server/convert/convert_frame.h"
+#include "server/frame_log.h"
+
+namespace halflight {
+
+void RenderFrameHandler::Start(const v1::RenderFrameRequest& request) {
+  if (const absl::Status status = Submit(request); !status.ok()) {
+    spdlog::info(RefusalLogLine(request.request_id(), status));
+    sink_.Finish(status);
+  }
+}
+
+absl::Status RenderFrameHandler::Submit(const v1::RenderFrameRequest& request) {
+  auto job = ConvertRequest(request, backend_.store, backend_.limits);
+  if (!job.ok()) {
+    return job.status();
+  }
+  return backend_.pipeline.Submit(
+      *std::move(job), stop_.get_token(),
+      [self = shared_from_this()](const auto& frame) { self->OnFrame(frame); });
+}
+
+void RenderFrameHandler::OnFrame(const absl::StatusOr<std::shared_ptr<const EncodedFrame>>& frame) {
+  if (!frame.ok()) {
+    sink_.Finish(frame.status());
+    return;
+  }
+  messages_.emplace(*frame);
+  WriteNext();
+}
+
+void RenderFrameHandler::OnWritten(bool ok) {
+  if (!ok) {
+    sink_.Finish(absl::CancelledError("the client is gone"));
+    return;
+  }
+  WriteNext();
+}
+
+void RenderFrameHandler::WriteNext() {
+  if (messages_->Next(message_)) {
+    sink_.Write(message_);
+  } else {
+    sink_.Finish(absl::OkStatus());
+  }
+}
+
+}  // namespace halflight

@@ -1,0 +1,43 @@
+// RenderFrame: one request in, one frame out, a message at a time as the peer takes them.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <stop_token>
+
+#include "halflight/v1/service.pb.h"
+#include "server/handlers/backend.h"
+#include "server/handlers/frame_messages.h"
+#include "server/handlers/sink.h"
+
+namespace halflight {
+
+// Held by the call, and by the pipeline while its frame is there: the sink has to live only until
+// it is finished.
+class RenderFrameHandler : public std::enable_shared_from_this<RenderFrameHandler> {
+ public:
+  RenderFrameHandler(const Backend& backend, ResponseSink<v1::RenderFrameResponse>& sink)
+      : backend_(backend), sink_(sink) {}
+
+  // Once, first.
+  void Start(const v1::RenderFrameRequest& request);
+  // After each write; not ok: the peer is gone.
+  void OnWritten(bool ok);
+  // The client has cancelled, left, or run out of time: stops the work, and the call then ends as
+  // the pipeline or the next write reports. Any thread, any time.
+  void OnCancel() { stop_.request_stop(); }
+
+ private:
+  absl::Status Submit(const v1::RenderFrameRequest& request);
+  void OnFrame(const absl::StatusOr<std::shared_ptr<const EncodedFrame>>& frame);
+  void WriteNext();
+
+  const Backend backend_;
+  ResponseSink<v1::RenderFrameResponse>& sink_;
+  std::stop_source stop_;
+  // From here on touched by one thread at a time: each step of the call starts the next.
+  std::optional<FrameMessages> messages_;
+  v1::RenderFrameResponse message_;
+};
+
+}  // namespace halflight

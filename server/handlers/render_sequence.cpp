@@ -1,0 +1,189 @@
+#include "server/handlers/render_sequence.h"
+
+#include <algorithm>
+#include <iterator>
+#include <string>
+#include <utility>
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include "server/frame_log.h"
+#include "server/status_text.h"
+
+namespace halflight {
+
+void RenderSequenceHandler::OnRequest(const v1::RenderSequenceRequest& request) {
+  auto job = state_.Next(request.frame(), backend_);
+  {
+    const std::lock_guard lock(mutex_);
+    reading_ = false;
+    slots_.push_back(std::make_shared<Slot>());
+    slots_.back()->index = next_index_++;
+    if (job.ok()) {
+      waiting_ = *std::move(job);
+      may_submit_ = true;
+    } else {
+      Refuse(*slots_.back(), request.frame().request_id(), job.status());
+    }
+  }
+  Advance();
+}
+
+// Under the mutex. The stream ends with this frame.
+void RenderSequenceHandler::Refuse(Slot& slot, const std::string& request_id,
+                                   const absl::Status& status) {
+  spdlog::info(RefusalLogLine(request_id, status));
+  slot.result = status;
+  requests_ended_ = true;
+}
+
+// Under the mutex.
+bool RenderSequenceHandler::HasFramesUnderWay() const {
+  return std::any_of(slots_.begin(), std::prev(slots_.end()),
+                     [](const auto& slot) { return !slot->result.has_value(); });
+}
+
+// By the thread that advances: hands the frame that waits to the pipeline.
+void RenderSequenceHandler::Submit() {
+  std::unique_lock lock(mutex_);
+  const std::shared_ptr<Slot> slot = slots_.back();
+  FrameJob job = *waiting_;
+  lock.unlock();
+  const absl::Status status = backend_.pipeline.Submit(
+      std::move(job), stop_.get_token(), [self = shared_from_this(), slot](FrameOrError frame) {
+        self->OnFrame(*slot, std::move(frame));
+      });
+  lock.lock();
+  // With frames of its own in the queue, or just out of it, the stream tries again.
+  if (absl::IsResourceExhausted(status) && (HasFramesUnderWay() || may_submit_)) {
+    return;
+  }
+  if (!status.ok()) {
+    Refuse(*slot, waiting_->request_id, status);
+  }
+  waiting_.reset();
+}
+
+void RenderSequenceHandler::OnEndOfRequests() {
+  {
+    const std::lock_guard lock(mutex_);
+    reading_ = false;
+    requests_ended_ = true;
+  }
+  Advance();
+}
+
+void RenderSequenceHandler::OnFrame(Slot& slot, FrameOrError result) {
+  {
+    const std::lock_guard lock(mutex_);
+    slot.result = std::move(result);
+    may_submit_ = true;
+  }
+  Advance();
+}
+
+void RenderSequenceHandler::OnWritten(bool ok) {
+  {
+    const std::lock_guard lock(mutex_);
+    writing_ = false;
+    if (!ok) {
+      End(absl::CancelledError("the client is gone"));
+    }
+  }
+  Advance();
+}
+
+void RenderSequenceHandler::OnCancel() {
+  {
+    const std::lock_guard lock(mutex_);
+    End(absl::CancelledError("the call was cancelled"));
+  }
+  Advance();
+}
+
+// Under the mutex. The first reason to end stays.
+void RenderSequenceHandler::End(const absl::Status& status) {
+  stop_.request_stop();
+  if (!end_.has_value()) {
+    end_ = status;
+  }
+}
+
+void RenderSequenceHandler::Advance() {
+  while (true) {
+    Step step = Step::kNothing;
+    {
+      const std::lock_guard lock(mutex_);
+      if (advancing_) {
+        return;  // whoever is at it looks again before leaving
+      }
+      step = NextStep();
+      advancing_ = step != Step::kNothing;
+    }
+    switch (step) {
+      case Step::kNothing:
+        return;
+      case Step::kSubmit:
+        Submit();
+        break;
+      case Step::kRead:
+        sink_.Read();
+        break;
+      case Step::kWrite:
+        sink_.Write(message_);
+        break;
+      case Step::kFinish:
+        // The last touch of the sink, and advancing_ stays: nobody steps any more.
+        sink_.Finish(*end_);
+        return;
+    }
+    const std::lock_guard lock(mutex_);
+    advancing_ = false;
+  }
+}
+
+// Under the mutex: what to do now.
+RenderSequenceHandler::Step RenderSequenceHandler::NextStep() {
+  if (finished_) {
+    return Step::kNothing;
+  }
+  if (!end_.has_value() && !writing_ && !slots_.empty() && slots_.front()->result.has_value()) {
+    const Slot& first = *slots_.front();
+    if (!first.result->ok()) {
+      End(Prefixed(fmt::format("frame {}: ", first.index), first.result->status()));
+    } else {
+      if (!messages_.has_value()) {
+        messages_.emplace(**first.result);
+      }
+      message_.set_frame_index(first.index);
+      if (messages_->Next(message_)) {
+        writing_ = true;
+        return Step::kWrite;
+      }
+      messages_.reset();
+      slots_.pop_front();
+      return NextStep();
+    }
+  }
+  if (!end_.has_value() && requests_ended_ && slots_.empty() && !reading_) {
+    end_ = absl::OkStatus();
+  }
+  if (end_.has_value()) {
+    if (writing_) {
+      return Step::kNothing;
+    }
+    finished_ = true;
+    return Step::kFinish;
+  }
+  if (waiting_.has_value()) {
+    return std::exchange(may_submit_, false) ? Step::kSubmit : Step::kNothing;
+  }
+  if (!reading_ && !requests_ended_ && slots_.size() < kFramesAhead) {
+    reading_ = true;
+    return Step::kRead;
+  }
+  return Step::kNothing;
+}
+
+}  // namespace halflight

@@ -1,0 +1,88 @@
+// RenderSequence: a stream of requests in, their frames out in the same order, a few requests
+// ahead. What a request inherits from the one before stands in sequence_state.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <stop_token>
+#include <string>
+
+#include "halflight/v1/service.pb.h"
+#include "server/handlers/backend.h"
+#include "server/handlers/frame_messages.h"
+#include "server/handlers/sequence_state.h"
+#include "server/handlers/sink.h"
+
+namespace halflight {
+
+// Requests of one stream that are rendered, or finished and not sent yet: enough to keep renderer,
+// encoder and wire busy at once, and the bound on what a slow reader makes the server hold.
+inline constexpr size_t kFramesAhead = 4;
+
+// Held by the call, and by the pipeline while frames of it are there: the sink has to live only
+// until it is finished.
+//
+// Reads, writes and frames complete on different threads. Each notes what happened under the mutex
+// and calls Advance, which lets one thread at a time do what follows, without the mutex: so the
+// sink is never called by two at once, and never after Finish.
+//
+// A stream never fails because its own frames fill the queue: the next one then waits for them.
+class RenderSequenceHandler : public std::enable_shared_from_this<RenderSequenceHandler> {
+ public:
+  RenderSequenceHandler(const Backend& backend, DuplexSink<v1::RenderSequenceResponse>& sink)
+      : backend_(backend), sink_(sink) {}
+
+  // Once, first.
+  void Start() { Advance(); }
+  void OnRequest(const v1::RenderSequenceRequest& request);
+  void OnEndOfRequests();
+  // After each write; not ok: the peer is gone.
+  void OnWritten(bool ok);
+  // The client has cancelled, left, or run out of time. Any thread, any time.
+  void OnCancel();
+
+ private:
+  using FrameOrError = absl::StatusOr<std::shared_ptr<const EncodedFrame>>;
+
+  struct Slot {
+    uint64_t index;  // in the stream
+    std::optional<FrameOrError> result;
+  };
+
+  enum class Step : uint8_t { kNothing, kSubmit, kRead, kWrite, kFinish };
+
+  void Refuse(Slot& slot, const std::string& request_id, const absl::Status& status);
+  void Submit();
+  [[nodiscard]] bool HasFramesUnderWay() const;
+  void OnFrame(Slot& slot, FrameOrError result);
+  void End(const absl::Status& status);
+  void Advance();
+  Step NextStep();
+
+  const Backend backend_;
+  DuplexSink<v1::RenderSequenceResponse>& sink_;
+  std::stop_source stop_;
+
+  // Touched only by the thread that completes a read; reads are one at a time.
+  SequenceState state_;
+  uint64_t next_index_ = 0;
+
+  std::mutex mutex_;
+  std::deque<std::shared_ptr<Slot>> slots_;  // in order; the first is being sent or waited for
+  std::optional<FrameJob> waiting_;          // of the last slot, to be submitted
+  bool may_submit_ = false;                  // there may be room for it in the queue
+  std::optional<FrameMessages> messages_;    // of the first slot
+  v1::RenderSequenceResponse message_;
+  std::optional<absl::Status> end_;  // what the call ends with
+  bool reading_ = false;
+  bool requests_ended_ = false;
+  bool writing_ = false;
+  bool finished_ = false;
+  bool advancing_ = false;
+};
+
+}  // namespace halflight

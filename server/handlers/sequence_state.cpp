@@ -1,0 +1,44 @@
+#include "server/handlers/sequence_state.h"
+
+#include <utility>
+
+namespace halflight {
+
+absl::StatusOr<FrameJob> SequenceState::Next(const v1::RenderFrameRequest& request,
+                                             const Backend& backend) {
+  const v1::Scene& scene = request.scene();
+  if (scene.particles_case() != v1::Scene::PARTICLES_NOT_SET || !particles_.has_value()) {
+    auto particles = ResolveParticles(scene, backend.store, backend.limits);
+    if (!particles.ok()) {
+      return particles.status();
+    }
+    particles_ = *std::move(particles);
+  }
+
+  v1::Scene& merged = *merged_.mutable_scene();
+  if (scene.has_time_offset_s()) {
+    merged.set_time_offset_s(scene.time_offset_s());
+  }
+  if (scene.has_camera()) {
+    *merged.mutable_camera() = scene.camera();
+  }
+  if (scene.has_lighting()) {
+    *merged.mutable_lighting() = scene.lighting();
+  }
+  if (scene.has_material()) {
+    *merged.mutable_material() = scene.material();
+  }
+  if (scene.has_shadow()) {
+    *merged.mutable_shadow() = scene.shadow();
+  }
+  if (scene.has_sampling()) {
+    *merged.mutable_sampling() = scene.sampling();
+  }
+  if (request.outputs_size() > 0) {
+    *merged_.mutable_outputs() = request.outputs();
+  }
+  merged_.set_request_id(request.request_id());
+  return ConvertFrame(merged_, *particles_, backend.limits);
+}
+
+}  // namespace halflight

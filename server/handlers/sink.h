@@ -1,0 +1,31 @@
+// Where handlers send their answers: what a gRPC reactor does, without gRPC, so that handlers are
+// tested without sockets.
+#pragma once
+
+#include "absl/status/status.h"
+
+namespace halflight {
+
+// One call's way back. A handler keeps at most one write under way, and does not touch the sink
+// after Finish. Each may answer before it returns.
+template <typename Response>
+class ResponseSink {
+ public:
+  virtual ~ResponseSink() = default;
+
+  // Sends one message, which stays unchanged until the handler's OnWritten is called.
+  virtual void Write(const Response& message) = 0;
+
+  // Ends the call. Not while a write is under way; a read may be.
+  virtual void Finish(const absl::Status& status) = 0;
+};
+
+// With a stream of requests as well.
+template <typename Response>
+class DuplexSink : public ResponseSink<Response> {
+ public:
+  // Asks for the next request: the handler's OnRequest or OnEndOfRequests follows. One at a time.
+  virtual void Read() = 0;
+};
+
+}  // namespace halflight

@@ -1,0 +1,30 @@
+// UploadParticles: feeds the stream's messages to an upload and answers once. What an upload is
+// stands in particle_upload.
+#pragma once
+
+#include <optional>
+
+#include "absl/status/statusor.h"
+#include "halflight/v1/particles.pb.h"
+#include "server/handlers/backend.h"
+#include "server/particle_upload.h"
+
+namespace halflight {
+
+// One thread at a time.
+class UploadParticlesHandler {
+ public:
+  using Answer = absl::StatusOr<v1::UploadParticlesResponse>;
+
+  explicit UploadParticlesHandler(const Backend& backend);
+
+  // The next message: none to go on reading, or the answer that ends the call.
+  std::optional<Answer> OnRequest(const v1::UploadParticlesRequest& request);
+
+  Answer OnEndOfRequests();
+
+ private:
+  ParticleUpload upload_;
+};
+
+}  // namespace halflight

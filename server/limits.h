@@ -1,0 +1,41 @@
+// What the server accepts at most. Only numbers: the checks stand where a value is read.
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+
+#include "renderer/frame_engine.h"
+
+namespace halflight {
+
+inline constexpr uint64_t kMiB = uint64_t{1} << 20U;
+inline constexpr uint64_t kGiB = uint64_t{1} << 30U;
+
+// See ServerLimits in service.proto for the meaning of each.
+struct ServerLimits {
+  uint64_t max_particles = 50'000'000;
+  uint64_t max_particle_bytes = 1 * kGiB;
+  uint64_t max_cache_bytes = 4 * kGiB;  // also bounds what all uploads in progress hold together
+  uint32_t max_image_size = 8192;
+  uint32_t max_light_buffer_size = 4096;
+  uint32_t max_slices = 65536;
+  uint32_t max_lights = 8;
+  uint32_t max_outputs = 16;
+  uint64_t max_output_bytes = 1 * kGiB;
+  uint64_t max_message_bytes = 2 * kMiB;
+  uint32_t max_queued_frames = 64;
+};
+
+inline constexpr uint32_t kMinLightBufferSize = 16;
+
+// The limits that still hold when the device cannot have textures as large as allowed.
+inline ServerLimits LimitsOnDevice(ServerLimits limits, const DeviceInfo& device) {
+  if (device.max_texture_size > 0) {
+    const auto largest = static_cast<uint32_t>(device.max_texture_size);
+    limits.max_image_size = std::min(limits.max_image_size, largest);
+    limits.max_light_buffer_size = std::min(limits.max_light_buffer_size, largest);
+  }
+  return limits;
+}
+
+}  // namespace halflight

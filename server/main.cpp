@@ -1,0 +1,113 @@
+// halflightd: flags, engine, service, wait, drain. What any of them does stands elsewhere.
+
+#include <chrono>
+#include <csignal>
+#include <cstdlib>
+#include <iostream>
+#include <memory>
+
+#include <spdlog/sinks/stdout_sinks.h>
+#include <spdlog/spdlog.h>
+
+#include "renderer/render_thread.h"
+#include "server/grpc_server.h"
+#include "server/options.h"
+#include "server/version.h"
+
+namespace {
+
+using namespace halflight;  // NOLINT(google-build-using-namespace): the whole program is of it
+
+constexpr int kExitBadFlags = 2;
+constexpr int kExitCannotStart = 1;
+constexpr int kExitCutShort = 3;
+
+// How often a drain looks whether it is over.
+constexpr timespec kDrainPoll{.tv_sec = 0, .tv_nsec = 20'000'000};
+
+sigset_t BlockTerminationSignals() {
+  sigset_t signals;
+  sigemptyset(&signals);
+  sigaddset(&signals, SIGTERM);
+  sigaddset(&signals, SIGINT);
+  pthread_sigmask(SIG_BLOCK, &signals, nullptr);
+  return signals;
+}
+
+// True when nothing is under way any more, false when a second signal or the time came first.
+bool Drain(GrpcServer& server, const sigset_t& signals, int seconds) {
+  const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(seconds);
+  server.BeginDrain();
+  while (!server.idle()) {
+    if (sigtimedwait(&signals, nullptr, &kDrainPoll) > 0 ||
+        std::chrono::steady_clock::now() >= until) {
+      return false;
+    }
+  }
+  return true;
+}
+
+int Fail(int code, const absl::Status& status) {
+  std::cerr << "halflightd: " << status.message() << "\n";
+  return code;
+}
+
+int Run(const Options& options, const sigset_t& signals) {
+  auto engine = RenderThread::Start(
+      {.device = options.device,
+       .max_queued_frames = static_cast<int>(options.limits.max_queued_frames)});
+  if (!engine.ok()) {
+    return Fail(kExitCannotStart, engine.status());
+  }
+  const DeviceInfo& device = (*engine)->device();
+  spdlog::info("device renderer=\"{}\" gl=\"{}\" software={}", device.gl_renderer,
+               device.gl_version, device.software);
+
+  // Each uses those above it, and is gone before them.
+  const ServerLimits limits = LimitsOnDevice(options.limits, device);
+  const std::string version = kVersion;
+  ParticleStore store(limits.max_cache_bytes);
+  ByteBudget upload_memory(limits.max_cache_bytes);
+  FramePipeline pipeline(**engine, {.max_queued_frames = limits.max_queued_frames,
+                                    .encode_threads = options.encode_threads,
+                                    .server_version = version});
+  auto server = GrpcServer::Start(options.addresses,
+                                  {device, limits, version, store, upload_memory, pipeline});
+  if (!server.ok()) {
+    return Fail(kExitCannotStart, server.status());
+  }
+  for (const std::string& address : (*server)->addresses()) {
+    spdlog::info("listening address={}", address);
+  }
+
+  int signal = 0;
+  sigwait(&signals, &signal);
+  spdlog::info("draining signal={} drain_seconds={}", signal, options.drain_seconds);
+  if (!Drain(**server, signals, options.drain_seconds)) {
+    // At once: what runs may be stuck, so nothing is waited for.
+    (*server)->RemoveSocketFiles();
+    spdlog::error("stopped before the calls under way were finished");
+    std::_Exit(kExitCutShort);
+  }
+  spdlog::info("stopped");
+  return EXIT_SUCCESS;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const auto options = ParseOptions(argc, argv, std::cout);
+  if (!options.ok()) {
+    return Fail(kExitBadFlags, options.status());
+  }
+  if (!options->has_value()) {
+    return EXIT_SUCCESS;
+  }
+  // Before any thread is made: all of them inherit the mask.
+  const sigset_t signals = BlockTerminationSignals();
+  spdlog::set_default_logger(spdlog::stderr_logger_mt("halflightd"));
+  spdlog::set_level(spdlog::level::from_str((*options)->log_level));
+  spdlog::set_pattern("%Y-%m-%dT%H:%M:%S.%e%z level=%l %v");
+  spdlog::flush_on(spdlog::level::info);
+  return Run(**options, signals);
+}

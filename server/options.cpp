@@ -1,0 +1,154 @@
+#include "server/options.h"
+
+#include <algorithm>
+#include <cstring>
+#include <limits>
+#include <ostream>
+#include <thread>
+
+#include <sys/un.h>
+
+#include <fmt/format.h>
+#include <CLI/CLI.hpp>
+
+#include "absl/strings/numbers.h"
+#include "server/convert/field_checks.h"
+#include "server/version.h"
+
+namespace halflight {
+namespace {
+
+constexpr const char* kLogLevels = "trace, debug, info, warn, error, off";
+constexpr double kMaxPort = 65535.0;
+
+// The longest path that a socket address holds, with its final zero.
+constexpr size_t kMaxSocketPath = sizeof(sockaddr_un::sun_path) - 1;
+
+void AddFlags(CLI::App& app, Options& options) {
+  app.add_option("--address", options.addresses,
+                 "Where to listen, host:port or unix:path; may be given several times. Port 0 "
+                 "takes a free one, which is logged")
+      ->capture_default_str()
+      ->type_name("ADDRESS");
+  app.add_option("--device", options.device,
+                 "What to render on: auto, software, uuid:<32 hex digits>, cuda:<index> or "
+                 "drm:<path>")
+      ->capture_default_str();
+  app.add_option("--log-level", options.log_level, fmt::format("One of {}", kLogLevels))
+      ->capture_default_str();
+  app.add_option("--encode-threads", options.encode_threads,
+                 "Threads that encode images; 0: one for each core but one");
+  app.add_option("--drain-seconds", options.drain_seconds,
+                 "How long what runs may go on after SIGTERM")
+      ->capture_default_str();
+
+  ServerLimits& limits = options.limits;
+  const auto number = [&app](const std::string& flag, auto& value, const std::string& help) {
+    app.add_option(flag, value, help)->capture_default_str()->group("Limits");
+  };
+  const auto bytes = [&app](const std::string& flag, uint64_t& value, const std::string& help) {
+    app.add_option(flag, value, help + "; takes suffixes such as 64MiB")
+        ->capture_default_str()
+        ->transform(CLI::AsSizeValue(false))
+        ->group("Limits");
+  };
+  number("--max-particles", limits.max_particles, "Particles of one set");
+  bytes("--max-particle-bytes", limits.max_particle_bytes, "Bytes of one particle set");
+  bytes("--max-cache-bytes", limits.max_cache_bytes,
+        "Bytes of all particle sets kept, and of all uploads in progress");
+  number("--max-image-size", limits.max_image_size,
+         "Width and height of an image, times supersampling");
+  number("--max-light-buffer-size", limits.max_light_buffer_size, "Texels along a light buffer");
+  number("--max-slices", limits.max_slices, "Slices of a frame");
+  number("--max-lights", limits.max_lights, "Lights of a frame");
+  number("--max-outputs", limits.max_outputs, "Outputs of a frame");
+  bytes("--max-output-bytes", limits.max_output_bytes,
+        "Pixels of all outputs of a frame, in bytes of 32-bit float");
+  number("--max-queued-frames", limits.max_queued_frames,
+         "Frames waiting, rendering or encoding, of all clients together");
+  bytes("--max-message-bytes", limits.max_message_bytes, "Largest message received");
+}
+
+void CheckAddress(const std::string& address, FieldChecks& checks) {
+  const std::string allowed = fmt::format(
+      "host:port with a port from 0 to 65535, or unix:path of at most {} bytes", kMaxSocketPath);
+  if (address.rfind("unix:", 0) == 0) {
+    const size_t length = address.size() - std::strlen("unix:");
+    if (length == 0 || length > kMaxSocketPath) {
+      checks.Reject("--address", address, allowed);
+    }
+    return;
+  }
+  const size_t colon = address.rfind(':');
+  int port = -1;
+  if (colon == std::string::npos || colon == 0 ||
+      !absl::SimpleAtoi(address.substr(colon + 1), &port) || port < 0 || port > kMaxPort) {
+    checks.Reject("--address", address, allowed);
+  }
+}
+
+absl::Status Check(const Options& options) {
+  FieldChecks checks;
+  for (const std::string& address : options.addresses) {
+    CheckAddress(address, checks);
+    const bool fixed = address.size() < 2 || address.compare(address.size() - 2, 2, ":0") != 0;
+    if (fixed && std::count(options.addresses.begin(), options.addresses.end(), address) > 1) {
+      checks.Reject("--address", address + " twice", "each address once");
+    }
+  }
+  const std::vector<std::string> levels = {"trace", "debug", "info", "warn", "error", "off"};
+  if (std::find(levels.begin(), levels.end(), options.log_level) == levels.end()) {
+    checks.Reject("--log-level", options.log_level, kLogLevels);
+  }
+  checks.InRange("--encode-threads", options.encode_threads, {.low = 0.0, .high = 256.0});
+  checks.InRange("--drain-seconds", options.drain_seconds, {.low = 0.0, .high = 86400.0});
+
+  const ServerLimits& limits = options.limits;
+  // Larger ones overflow the renderer's 32-bit sizes.
+  checks.InRange("--max-image-size", limits.max_image_size, {.low = 1.0, .high = 32768.0});
+  checks.InRange("--max-light-buffer-size", limits.max_light_buffer_size,
+                 {.low = static_cast<double>(kMinLightBufferSize), .high = 32768.0});
+  checks.InRange("--max-particles", limits.max_particles, {.low = 1.0, .high = 0x1p31 - 1.0});
+  checks.InRange("--max-slices", limits.max_slices, {.low = 1.0, .high = 0x1p31 - 1.0});
+  checks.InRange("--max-lights", limits.max_lights, {.low = 0.0, .high = 1024.0});
+  checks.InRange("--max-outputs", limits.max_outputs, {.low = 1.0, .high = 1024.0});
+  checks.InRange("--max-output-bytes", limits.max_output_bytes, {.low = 1.0});
+  checks.InRange("--max-queued-frames", limits.max_queued_frames, {.low = 1.0, .high = 65536.0});
+  // Room for a chunk of 64 KiB, the smallest that particles.proto recommends, and what is round it.
+  checks.InRange("--max-message-bytes", limits.max_message_bytes,
+                 {.low = 128.0 * 1024.0, .high = std::numeric_limits<int32_t>::max()});
+  checks.InRange("--max-particle-bytes", limits.max_particle_bytes, {.low = 1.0});
+  if (limits.max_cache_bytes < limits.max_particle_bytes) {
+    checks.Reject("--max-cache-bytes", fmt::format("{}", limits.max_cache_bytes),
+                  fmt::format("at least --max-particle-bytes, {}", limits.max_particle_bytes));
+  }
+  return checks.status();
+}
+
+}  // namespace
+
+absl::StatusOr<std::optional<Options>> ParseOptions(int argc, const char* const* argv,
+                                                    std::ostream& out) {
+  Options options;
+  CLI::App app("halflightd: renders particle clouds for clients over gRPC", "halflightd");
+  app.set_version_flag("--version", std::string("halflightd ") + kVersion);
+  AddFlags(app, options);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::Success& success) {
+    app.exit(success, out, out);
+    return std::nullopt;
+  } catch (const CLI::ParseError& error) {
+    return absl::InvalidArgumentError(error.what());
+  }
+  if (absl::Status status = Check(options); !status.ok()) {
+    return status;
+  }
+  if (options.encode_threads == 0) {
+    const auto cores = static_cast<int>(std::thread::hardware_concurrency());
+    options.encode_threads = std::max(1, cores - 1);
+  }
+  return options;
+}
+
+}  // namespace halflight

@@ -1,0 +1,53 @@
+#include "server/particle_store.h"
+
+#include <utility>
+#include <vector>
+
+namespace halflight {
+
+uint64_t MemoryBytes(const ParticleSet& set) {
+  const auto of = [](const auto& values) { return values.size() * sizeof(*values.data()); };
+  return of(set.positions) + of(set.radii) + of(set.opacities) + of(set.colors) +
+         of(set.velocities) + of(set.emissions);
+}
+
+std::shared_ptr<const ParticleSet> ParticleStore::Find(const std::string& sha256) {
+  const std::lock_guard lock(mutex_);
+  const auto found = by_name_.find(sha256);
+  if (found == by_name_.end()) {
+    return nullptr;
+  }
+  by_use_.splice(by_use_.begin(), by_use_, found->second);
+  return found->second->set;
+}
+
+void ParticleStore::Insert(const std::string& sha256, std::shared_ptr<const ParticleSet> set) {
+  const uint64_t bytes = MemoryBytes(*set);
+  if (bytes > max_bytes_) {
+    return;
+  }
+  // Freed after the lock is: giving back a gigabyte takes longer than anybody should wait.
+  std::vector<std::shared_ptr<const ParticleSet>> dropped;
+  const std::lock_guard lock(mutex_);
+  if (const auto found = by_name_.find(sha256); found != by_name_.end()) {
+    by_use_.splice(by_use_.begin(), by_use_, found->second);
+    return;
+  }
+  while (bytes_ + bytes > max_bytes_) {
+    Entry& oldest = by_use_.back();
+    bytes_ -= oldest.bytes;
+    by_name_.erase(oldest.sha256);
+    dropped.push_back(std::move(oldest.set));
+    by_use_.pop_back();
+  }
+  by_use_.push_front({sha256, std::move(set), bytes});
+  by_name_[sha256] = by_use_.begin();
+  bytes_ += bytes;
+}
+
+uint64_t ParticleStore::bytes() const {
+  const std::lock_guard lock(mutex_);
+  return bytes_;
+}
+
+}  // namespace halflight

@@ -1,0 +1,233 @@
+#include "server/render_service.h"
+
+#include <atomic>
+#include <optional>
+#include <utility>
+
+#include "absl/status/status.h"
+#include "halflight/v1/service.grpc.pb.h"
+#include "server/handlers/find_missing_particles.h"
+#include "server/handlers/get_server_info.h"
+#include "server/handlers/render_frame.h"
+#include "server/handlers/render_sequence.h"
+#include "server/handlers/upload_particles.h"
+#include "server/status_to_grpc.h"
+
+// The callback API deletes a reactor in OnDone, which comes after Finish and after every reaction
+// has returned. So a reactor never touches itself after Finish other than by returning, and
+// whatever may outlast the call (a handler that the pipeline still holds) is shared and leaves its
+// sink alone once it has finished it.
+
+namespace halflight {
+namespace {
+
+using grpc::CallbackServerContext;
+
+// How many calls are under way, and whether more may come.
+struct CallCount {
+  std::atomic<int> active = 0;
+  std::atomic<bool> draining = false;
+};
+
+// One call under way. Counted before draining is looked at, so that whoever drains and then sees no
+// calls can be sure that none slips in.
+class CallToken {
+ public:
+  explicit CallToken(CallCount& count) : count_(count) { ++count_.active; }
+  ~CallToken() { --count_.active; }
+  CallToken(const CallToken&) = delete;
+  CallToken& operator=(const CallToken&) = delete;
+  CallToken(CallToken&&) = delete;
+  CallToken& operator=(CallToken&&) = delete;
+
+  [[nodiscard]] bool refused() const { return count_.draining; }
+
+ private:
+  CallCount& count_;
+};
+
+absl::Status DrainingError() {
+  return absl::UnavailableError("the server is shutting down: retry elsewhere or later");
+}
+
+class UploadCall final : public grpc::ServerReadReactor<v1::UploadParticlesRequest> {
+ public:
+  UploadCall(const Backend& backend, CallCount& count, CallbackServerContext& context,
+             v1::UploadParticlesResponse& response)
+      : token_(count), context_(context), response_(response), handler_(backend) {
+    if (token_.refused()) {
+      Answer(DrainingError());
+    } else {
+      StartRead(&request_);
+    }
+  }
+
+  void OnReadDone(bool ok) override {
+    if (!ok) {
+      Answer(handler_.OnEndOfRequests());
+      return;
+    }
+    if (const auto answer = handler_.OnRequest(request_)) {
+      Answer(*answer);
+    } else {
+      StartRead(&request_);
+    }
+  }
+
+  void OnDone() override { delete this; }
+
+ private:
+  void Answer(const UploadParticlesHandler::Answer& answer) {
+    if (answer.ok()) {
+      response_ = *answer;
+    }
+    Finish(ToGrpc(answer.status(), context_));
+  }
+
+  const CallToken token_;
+  CallbackServerContext& context_;
+  v1::UploadParticlesResponse& response_;
+  UploadParticlesHandler handler_;
+  v1::UploadParticlesRequest request_;
+};
+
+class RenderFrameCall final : public grpc::ServerWriteReactor<v1::RenderFrameResponse>,
+                              public ResponseSink<v1::RenderFrameResponse> {
+  using Reactor = grpc::ServerWriteReactor<v1::RenderFrameResponse>;
+
+ public:
+  RenderFrameCall(const Backend& backend, CallCount& count, CallbackServerContext& context,
+                  const v1::RenderFrameRequest& request)
+      : token_(count),
+        context_(context),
+        handler_(std::make_shared<RenderFrameHandler>(backend, *this)) {
+    if (token_.refused()) {
+      RenderFrameCall::Finish(DrainingError());
+    } else {
+      handler_->Start(request);
+    }
+  }
+
+  void OnWriteDone(bool ok) override { handler_->OnWritten(ok); }
+  void OnCancel() override { handler_->OnCancel(); }
+  void OnDone() override { delete this; }
+
+ private:
+  void Write(const v1::RenderFrameResponse& message) override { StartWrite(&message); }
+  void Finish(const absl::Status& status) override { Reactor::Finish(ToGrpc(status, context_)); }
+
+  const CallToken token_;
+  CallbackServerContext& context_;
+  const std::shared_ptr<RenderFrameHandler> handler_;
+};
+
+class RenderSequenceCall final
+    : public grpc::ServerBidiReactor<v1::RenderSequenceRequest, v1::RenderSequenceResponse>,
+      public DuplexSink<v1::RenderSequenceResponse> {
+  using Reactor = grpc::ServerBidiReactor<v1::RenderSequenceRequest, v1::RenderSequenceResponse>;
+
+ public:
+  RenderSequenceCall(const Backend& backend, CallCount& count, CallbackServerContext& context)
+      : token_(count),
+        context_(context),
+        handler_(std::make_shared<RenderSequenceHandler>(backend, *this)) {
+    if (token_.refused()) {
+      RenderSequenceCall::Finish(DrainingError());
+    } else {
+      handler_->Start();
+    }
+  }
+
+  void OnReadDone(bool ok) override {
+    if (ok) {
+      handler_->OnRequest(request_);
+    } else {
+      handler_->OnEndOfRequests();
+    }
+  }
+  void OnWriteDone(bool ok) override { handler_->OnWritten(ok); }
+  void OnCancel() override { handler_->OnCancel(); }
+  void OnDone() override { delete this; }
+
+ private:
+  void Read() override { StartRead(&request_); }
+  void Write(const v1::RenderSequenceResponse& message) override { StartWrite(&message); }
+  void Finish(const absl::Status& status) override { Reactor::Finish(ToGrpc(status, context_)); }
+
+  const CallToken token_;
+  CallbackServerContext& context_;
+  const std::shared_ptr<RenderSequenceHandler> handler_;
+  v1::RenderSequenceRequest request_;
+};
+
+}  // namespace
+
+class RenderService::Calls final : public v1::RenderService::CallbackService {
+ public:
+  explicit Calls(const Backend& backend) : backend_(backend) {}
+
+  CallCount& count() { return count_; }
+
+  grpc::ServerUnaryReactor* GetServerInfo(CallbackServerContext* context,
+                                          const v1::GetServerInfoRequest* /*request*/,
+                                          v1::GetServerInfoResponse* response) override {
+    return AnswerAtOnce(*context, *response, [&]() -> absl::StatusOr<v1::GetServerInfoResponse> {
+      return halflight::GetServerInfo(backend_);
+    });
+  }
+
+  grpc::ServerUnaryReactor* FindMissingParticles(
+      CallbackServerContext* context, const v1::FindMissingParticlesRequest* request,
+      v1::FindMissingParticlesResponse* response) override {
+    return AnswerAtOnce(*context, *response,
+                        [&] { return halflight::FindMissingParticles(backend_, *request); });
+  }
+
+  grpc::ServerReadReactor<v1::UploadParticlesRequest>* UploadParticles(
+      CallbackServerContext* context, v1::UploadParticlesResponse* response) override {
+    return new UploadCall(backend_, count_, *context, *response);
+  }
+
+  grpc::ServerWriteReactor<v1::RenderFrameResponse>* RenderFrame(
+      CallbackServerContext* context, const v1::RenderFrameRequest* request) override {
+    return new RenderFrameCall(backend_, count_, *context, *request);
+  }
+
+  grpc::ServerBidiReactor<v1::RenderSequenceRequest, v1::RenderSequenceResponse>* RenderSequence(
+      CallbackServerContext* context) override {
+    return new RenderSequenceCall(backend_, count_, *context);
+  }
+
+ private:
+  template <typename Response, typename Handler>
+  grpc::ServerUnaryReactor* AnswerAtOnce(CallbackServerContext& context, Response& response,
+                                         const Handler& handler) {
+    const CallToken token(count_);
+    absl::Status status = DrainingError();
+    if (!token.refused()) {
+      auto answer = handler();
+      status = answer.status();
+      if (answer.ok()) {
+        response = *std::move(answer);
+      }
+    }
+    grpc::ServerUnaryReactor* const reactor = context.DefaultReactor();
+    reactor->Finish(ToGrpc(status, context));
+    return reactor;
+  }
+
+  const Backend backend_;
+  CallCount count_;
+};
+
+RenderService::RenderService(const Backend& backend) : calls_(std::make_unique<Calls>(backend)) {}
+
+RenderService::~RenderService() = default;
+
+grpc::Service& RenderService::grpc_service() { return *calls_; }
+
+void RenderService::BeginDrain() { calls_->count().draining = true; }
+
+int RenderService::active_calls() const { return calls_->count().active; }
+
+}  // namespace halflight

@@ -1,0 +1,38 @@
+// The gRPC service: one forwarding method an RPC, and nothing else that gRPC has to be known for.
+// What the calls do stands in handlers/.
+#pragma once
+
+#include <memory>
+
+#include "server/handlers/backend.h"
+
+namespace grpc {
+class Service;
+}  // namespace grpc
+
+namespace halflight {
+
+class RenderService {
+ public:
+  explicit RenderService(const Backend& backend);
+  // After the gRPC server that it was registered with.
+  ~RenderService();
+  RenderService(const RenderService&) = delete;
+  RenderService& operator=(const RenderService&) = delete;
+  RenderService(RenderService&&) = delete;
+  RenderService& operator=(RenderService&&) = delete;
+
+  // What a gRPC server registers.
+  grpc::Service& grpc_service();
+
+  // From now on new calls are refused with UNAVAILABLE; those under way go on.
+  void BeginDrain();
+  // Calls under way.
+  [[nodiscard]] int active_calls() const;
+
+ private:
+  class Calls;
+  std::unique_ptr<Calls> calls_;
+};
+
+}  // namespace halflight

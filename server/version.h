@@ -1,0 +1,8 @@
+// The version of halflightd, from the build.
+#pragma once
+
+namespace halflight {
+
+inline constexpr const char* kVersion = HALFLIGHT_VERSION;
+
+}  // namespace halflight

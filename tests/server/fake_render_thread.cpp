@@ -1,0 +1,47 @@
+// RenderThread for a halflightd without GL, under the real one's name. Frames wait for as long as
+// the file that --device names is there.
+
+#include "renderer/render_thread.h"
+
+#include <atomic>
+#include <chrono>
+#include <filesystem>
+#include <thread>
+#include <utility>
+
+#include "tests/server/fake_engine.h"
+
+namespace halflight {
+namespace {
+
+class FakeRenderThread : public RenderThread {
+ public:
+  explicit FakeRenderThread(std::string hold) : hold_(std::move(hold)) {}
+
+  absl::Status Submit(FrameRequest request, std::stop_token stop, Done done) override {
+    return engine_.Submit(std::move(request), std::move(stop), std::move(done));
+  }
+  [[nodiscard]] const DeviceInfo& device() const override { return engine_.device(); }
+
+ private:
+  testing::FakeEngine engine_;
+  const std::string hold_;
+  std::jthread watcher_{[this](const std::stop_token& stop) {
+    while (!stop.stop_requested()) {
+      engine_.SetGate(!std::filesystem::exists(hold_));
+      std::this_thread::sleep_for(std::chrono::milliseconds(2));
+    }
+  }};
+};
+
+}  // namespace
+
+absl::StatusOr<std::unique_ptr<RenderThread>> RenderThread::Start(
+    const RenderThreadOptions& options) {
+  if (options.device == "missing") {
+    return absl::NotFoundError("--device: missing, allowed: what is there");
+  }
+  return std::make_unique<FakeRenderThread>(options.device);
+}
+
+}  // namespace halflight

@@ -1,0 +1,231 @@
+// The pipeline between engine and calls: complete frames, errors, bounds, cancellation, threads.
+
+#include "server/frame_pipeline.h"
+
+#include <atomic>
+#include <future>
+#include <thread>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "halflight/sha256.h"
+#include "server/frame_log.h"
+#include "server/retry_hint.h"
+#include "tests/server/fake_engine.h"
+
+namespace halflight {
+namespace {
+
+using testing::FakeEngine;
+using testing::FakeImage;
+using ::testing::HasSubstr;
+using testing::MakeRequest;
+using testing::WaitFor;
+
+using Result = absl::StatusOr<std::shared_ptr<const EncodedFrame>>;
+
+FrameJob MakeJob(const v1::RenderFrameRequest& request = MakeRequest()) {
+  ParticleStore store(1 << 20);
+  return *ConvertRequest(request, store, ServerLimits{});
+}
+
+// The image's floats as they lie in memory.
+absl::StatusOr<EncodedImage> EncodePlain(const Image& image, ImageKind /*kind*/,
+                                         LightQuantity /*quantity*/,
+                                         const EncodeSettings& /*settings*/,
+                                         const ImageMetadata& /*metadata*/) {
+  EncodedImage encoded{.bytes = {}, .media_type = "test/plain", .white_black = {}};
+  encoded.bytes.assign(reinterpret_cast<const char*>(image.pixels.data()),
+                       image.pixels.size() * sizeof(float));
+  return encoded;
+}
+
+class Pipeline : public ::testing::Test {
+ protected:
+  void Start(PipelineOptions options) { pipeline_.emplace(engine_, std::move(options)); }
+
+  std::future<Result> Submit(FrameJob job, std::stop_token stop = {}) {
+    auto promise = std::make_shared<std::promise<Result>>();
+    const absl::Status status =
+        pipeline_->Submit(std::move(job), std::move(stop),
+                          [promise](Result result) { promise->set_value(std::move(result)); });
+    if (!status.ok()) {
+      promise->set_value(status);
+    }
+    return promise->get_future();
+  }
+
+  FakeEngine engine_;
+  std::optional<FramePipeline> pipeline_;
+};
+
+TEST_F(Pipeline, FrameHoldsEveryOutputWithItsDigestInOrder) {
+  Start({.encode_threads = 3, .server_version = "1.2.3", .encode = EncodePlain});
+  v1::RenderFrameRequest request = MakeRequest();
+  request.add_outputs()->set_kind(v1::OUTPUT_KIND_DEPTH);
+  request.add_outputs()->set_kind(v1::OUTPUT_KIND_COVERAGE);
+  const FrameJob job = MakeJob(request);
+  const Result result = Submit(job).get();
+  ASSERT_TRUE(result.ok()) << result.status();
+  const EncodedFrame& frame = **result;
+  ASSERT_EQ(frame.outputs.size(), 3U);
+  for (size_t i = 0; i < 3; ++i) {
+    const Image image = FakeImage(job.request.scene, job.request.images[i], i);
+    EXPECT_EQ(frame.outputs[i], EncodePlain(image, {}, {}, {ImageFormat::kPng8}, {})->bytes);
+    EXPECT_EQ(frame.trailer.output_sha256(static_cast<int>(i)), Sha256Of(frame.outputs[i]));
+  }
+  EXPECT_EQ(frame.header.metadata().server_version(), "1.2.3");
+  EXPECT_EQ(frame.header.metadata().gl_renderer(), "fake");
+  EXPECT_EQ(frame.header.plan().passes(0).name(), "pretend");
+  EXPECT_EQ(frame.header.timings(0).stage(), "queue");
+  EXPECT_EQ(frame.header.timings(1).stage(), "composite");
+  EXPECT_EQ(frame.header.timings(2).stage(), "encode");
+  EXPECT_EQ(frame.header.timings(3).stage(), "total");
+}
+
+TEST_F(Pipeline, MakesRequestIdsThatDiffer) {
+  Start({.encode = EncodePlain});
+  const Result first = Submit(MakeJob()).get();
+  const Result second = Submit(MakeJob()).get();
+  EXPECT_FALSE((*first)->header.metadata().request_id().empty());
+  EXPECT_NE((*first)->header.metadata().request_id(), (*second)->header.metadata().request_id());
+}
+
+TEST_F(Pipeline, EngineErrorsArriveAsTheyAre) {
+  Start({.encode = EncodePlain});
+  engine_.FailWith(absl::InvalidArgumentError("scene.lighting: nonsense"));
+  const Result result = Submit(MakeJob()).get();
+  EXPECT_EQ(result.status().code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_EQ(result.status().message(), "scene.lighting: nonsense");
+}
+
+TEST_F(Pipeline, EncodingErrorsNameTheOutput) {
+  Start({.encode = [](const Image& image, ImageKind kind, LightQuantity quantity,
+                      const EncodeSettings& settings,
+                      const ImageMetadata& metadata) -> absl::StatusOr<EncodedImage> {
+    if (kind == ImageKind::kDepth) {
+      return absl::InvalidArgumentError("too large for PNG");
+    }
+    return EncodePlain(image, kind, quantity, settings, metadata);
+  }});
+  v1::RenderFrameRequest request = MakeRequest();
+  request.add_outputs()->set_kind(v1::OUTPUT_KIND_DEPTH);
+  const Result result = Submit(MakeJob(request)).get();
+  EXPECT_EQ(result.status().code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_EQ(result.status().message(), "outputs[1]: too large for PNG");
+}
+
+TEST_F(Pipeline, RefusesWithAHintWhenFullAndTakesAgainAfterwards) {
+  Start({.max_queued_frames = 2, .encode = EncodePlain});
+  engine_.SetGate(false);
+  auto first = Submit(MakeJob());
+  auto second = Submit(MakeJob());
+  const Result third = Submit(MakeJob()).get();
+  EXPECT_EQ(third.status().code(), absl::StatusCode::kResourceExhausted);
+  EXPECT_TRUE(RetryHint(third.status()).has_value());
+  engine_.SetGate(true);
+  EXPECT_TRUE(first.get().ok());
+  EXPECT_TRUE(second.get().ok());
+  EXPECT_TRUE(Submit(MakeJob()).get().ok());
+}
+
+TEST_F(Pipeline, FramesThatWaitForTheEncoderCountAsQueued) {
+  std::promise<void> release;
+  Start({.max_queued_frames = 1,
+         .encode = [held = release.get_future().share()](
+                       const Image& image, ImageKind kind, LightQuantity quantity,
+                       const EncodeSettings& settings, const ImageMetadata& metadata) {
+           held.wait();
+           return EncodePlain(image, kind, quantity, settings, metadata);
+         }});
+  auto first = Submit(MakeJob());
+  ASSERT_TRUE(WaitFor([&] { return engine_.rendered() == 1; }));
+  EXPECT_EQ(Submit(MakeJob()).get().status().code(), absl::StatusCode::kResourceExhausted);
+  release.set_value();
+  EXPECT_TRUE(first.get().ok());
+}
+
+TEST_F(Pipeline, EncodingDoesNotHoldUpRendering) {
+  std::promise<void> release;
+  Start({.encode_threads = 1,
+         .encode = [held = release.get_future().share()](
+                       const Image& image, ImageKind kind, LightQuantity quantity,
+                       const EncodeSettings& settings, const ImageMetadata& metadata) {
+           held.wait();
+           return EncodePlain(image, kind, quantity, settings, metadata);
+         }});
+  auto first = Submit(MakeJob());
+  auto second = Submit(MakeJob());
+  auto third = Submit(MakeJob());
+  EXPECT_TRUE(WaitFor([&] { return engine_.rendered() == 3; }));
+  release.set_value();
+  EXPECT_TRUE(first.get().ok());
+  EXPECT_TRUE(second.get().ok());
+  EXPECT_TRUE(third.get().ok());
+}
+
+TEST_F(Pipeline, CancelledFrameIsDroppedBeforeItIsRendered) {
+  Start({.encode = EncodePlain});
+  engine_.SetGate(false);
+  std::stop_source stop;
+  auto frame = Submit(MakeJob(), stop.get_token());
+  stop.request_stop();
+  EXPECT_EQ(frame.get().status().code(), absl::StatusCode::kCancelled);
+  EXPECT_EQ(engine_.rendered(), 0);
+}
+
+TEST_F(Pipeline, CancelledFrameIsNotEncoded) {
+  std::atomic<int> encoded = 0;
+  std::stop_source stop;
+  Start({.encode_threads = 1,
+         .encode = [&](const Image& image, ImageKind kind, LightQuantity quantity,
+                       const EncodeSettings& settings, const ImageMetadata& metadata) {
+           ++encoded;
+           stop.request_stop();
+           return EncodePlain(image, kind, quantity, settings, metadata);
+         }});
+  v1::RenderFrameRequest request = MakeRequest();
+  request.add_outputs()->set_kind(v1::OUTPUT_KIND_DEPTH);
+  request.add_outputs()->set_kind(v1::OUTPUT_KIND_COVERAGE);
+  const Result result = Submit(MakeJob(request), stop.get_token()).get();
+  EXPECT_EQ(result.status().code(), absl::StatusCode::kCancelled);
+  EXPECT_EQ(encoded, 1) << "the outputs after the cancellation were encoded";
+}
+
+TEST_F(Pipeline, RefusalOfTheEngineLeavesRoomForTheNext) {
+  Start({.max_queued_frames = 1, .encode = EncodePlain});
+  engine_.RefuseWith(absl::ResourceExhaustedError("full"));
+  const Result refused = Submit(MakeJob()).get();
+  EXPECT_EQ(refused.status().code(), absl::StatusCode::kResourceExhausted);
+  EXPECT_TRUE(RetryHint(refused.status()).has_value());
+  engine_.RefuseWith(absl::OkStatus());
+  EXPECT_TRUE(Submit(MakeJob()).get().ok());
+}
+
+TEST_F(Pipeline, EndWaitsForWhatWasAccepted) {
+  Start({.encode = EncodePlain});
+  engine_.SetGate(false);
+  auto frame = Submit(MakeJob());
+  std::jthread opener([this] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(30));
+    engine_.SetGate(true);
+  });
+  pipeline_.reset();
+  EXPECT_EQ(frame.wait_for(std::chrono::seconds(0)), std::future_status::ready);
+}
+
+TEST(FrameLog, IsOneLineOfKeysWhateverTheClientSends) {
+  FrameJob job = MakeJob();
+  job.request_id = "a \"b\" \\";
+  const std::string line =
+      FrameLogLine(job, {{"light sweep", 1.5}, {"total", 2.0}}, absl::InternalError("two\nlines"));
+  EXPECT_THAT(line, HasSubstr(R"(request_id="a \"b\" \\")"));
+  EXPECT_THAT(line, HasSubstr("technique=SHADOW_TECHNIQUE_HALF_ANGLE particles=2 size=64x48"));
+  EXPECT_THAT(line, HasSubstr("light_sweep_ms=1.50 total_ms=2.00 outcome=INTERNAL"));
+  EXPECT_THAT(line, HasSubstr(R"(message="two?lines")"));
+  EXPECT_EQ(line.find('\n'), std::string::npos);
+}
+
+}  // namespace
+}  // namespace halflight

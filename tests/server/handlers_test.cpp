@@ -1,0 +1,441 @@
+// The handlers without sockets: what they send, in which order, how much they hold, how they end.
+
+#include <condition_variable>
+#include <mutex>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "halflight/sha256.h"
+#include "server/handlers/find_missing_particles.h"
+#include "server/handlers/get_server_info.h"
+#include "server/handlers/render_frame.h"
+#include "server/handlers/render_sequence.h"
+#include "server/handlers/upload_particles.h"
+#include "server/retry_hint.h"
+#include "tests/server/fake_engine.h"
+
+namespace halflight {
+namespace {
+
+using testing::FakeEngine;
+using ::testing::HasSubstr;
+using testing::MakeParticles;
+using testing::MakeRequest;
+using ::testing::StartsWith;
+using testing::WaitFor;
+
+absl::StatusOr<EncodedImage> EncodePlain(const Image& image, ImageKind /*kind*/,
+                                         LightQuantity /*quantity*/,
+                                         const EncodeSettings& /*settings*/,
+                                         const ImageMetadata& /*metadata*/) {
+  EncodedImage encoded{.bytes = {}, .media_type = "test/plain", .white_black = {}};
+  encoded.bytes.assign(reinterpret_cast<const char*>(image.pixels.data()),
+                       image.pixels.size() * sizeof(float));
+  return encoded;
+}
+
+// Collects what a handler writes. Answers each write only when Take is called, so that a test is a
+// peer as slow as it likes; breaks the rules of the sink loudly.
+template <typename Response>
+class FakeSink : public DuplexSink<Response> {
+ public:
+  void Write(const Response& message) override {
+    const std::lock_guard lock(mutex_);
+    EXPECT_FALSE(finished_.has_value()) << "a write after Finish";
+    EXPECT_FALSE(writing_) << "a write while another is under way";
+    writing_ = true;
+    written_.push_back(message);
+    changed_.notify_all();
+  }
+
+  void Finish(const absl::Status& status) override {
+    const std::lock_guard lock(mutex_);
+    EXPECT_FALSE(finished_.has_value()) << "a second Finish";
+    EXPECT_FALSE(writing_) << "Finish while a write is under way";
+    finished_ = status;
+    changed_.notify_all();
+  }
+
+  void Read() override {
+    const std::lock_guard lock(mutex_);
+    EXPECT_FALSE(finished_.has_value()) << "a read after Finish";
+    ++reads_;
+    changed_.notify_all();
+  }
+
+  // Waits for a write or the end; then the handler may be told of the write. False at the end.
+  bool WaitForWrite() {
+    std::unique_lock lock(mutex_);
+    EXPECT_TRUE(changed_.wait_for(lock, std::chrono::seconds(10),
+                                  [this] { return writing_ || finished_.has_value(); }));
+    const bool wrote = writing_;
+    writing_ = false;
+    return wrote;
+  }
+
+  // The handler may end the call on another thread than the one that gave it the reason.
+  absl::Status WaitForFinish() {
+    EXPECT_TRUE(WaitFor([this] { return finished().has_value(); }));
+    return finished().value_or(absl::UnknownError("not finished"));
+  }
+
+  [[nodiscard]] std::optional<absl::Status> finished() const {
+    const std::lock_guard lock(mutex_);
+    return finished_;
+  }
+  [[nodiscard]] int reads() const {
+    const std::lock_guard lock(mutex_);
+    return reads_;
+  }
+  [[nodiscard]] std::vector<Response> written() const {
+    const std::lock_guard lock(mutex_);
+    return written_;
+  }
+
+ private:
+  mutable std::mutex mutex_;
+  std::condition_variable changed_;
+  std::vector<Response> written_;
+  bool writing_ = false;
+  int reads_ = 0;
+  std::optional<absl::Status> finished_;
+};
+
+class Handlers : public ::testing::Test {
+ protected:
+  FakeEngine engine_;
+  ServerLimits limits_;
+  std::string version_ = "1.2.3";
+  ParticleStore store_{1 << 20};
+  ByteBudget upload_memory_{1 << 20};
+  FramePipeline pipeline_{engine_,
+                          {.max_queued_frames = 64, .encode_threads = 2, .encode = EncodePlain}};
+  Backend backend_{engine_.device(), limits_, version_, store_, upload_memory_, pipeline_};
+};
+
+TEST_F(Handlers, ServerInfoTellsDeviceLimitsAndWhatIsOffered) {
+  limits_.max_slices = 123;
+  const v1::GetServerInfoResponse info = GetServerInfo(backend_);
+  EXPECT_EQ(info.server_version(), "1.2.3");
+  EXPECT_EQ(info.gl_renderer(), "fake");
+  EXPECT_EQ(info.limits().max_slices(), 123U);
+  EXPECT_EQ(info.techniques_size(), v1::ShadowTechnique_ARRAYSIZE - 1);
+  EXPECT_EQ(info.output_kinds_size(), v1::OutputKind_ARRAYSIZE - 1);
+  EXPECT_EQ(info.formats_size(), v1::ImageFormat_ARRAYSIZE - 1);
+}
+
+TEST_F(Handlers, FindMissingKeepsTheOrderAndChecksNames) {
+  store_.Insert(std::string(32, 'b'), std::make_shared<ParticleSet>());
+  v1::FindMissingParticlesRequest request;
+  for (const char name : {'c', 'b', 'a'}) {
+    request.add_sha256(std::string(32, name));
+  }
+  const auto response = FindMissingParticles(backend_, request);
+  ASSERT_TRUE(response.ok());
+  ASSERT_EQ(response->missing_sha256_size(), 2);
+  EXPECT_EQ(response->missing_sha256(0), std::string(32, 'c'));
+  EXPECT_EQ(response->missing_sha256(1), std::string(32, 'a'));
+
+  request.set_sha256(1, "short");
+  EXPECT_THAT(std::string(FindMissingParticles(backend_, request).status().message()),
+              HasSubstr("sha256[1]: 5 bytes, allowed: 32 bytes"));
+  request.Clear();
+  for (int i = 0; i < 1025; ++i) {
+    request.add_sha256(std::string(32, 'x'));
+  }
+  EXPECT_EQ(FindMissingParticles(backend_, request).status().code(),
+            absl::StatusCode::kInvalidArgument);
+}
+
+TEST_F(Handlers, UploadAnswersErrorsAtOnceAndSuccessAtTheEndOfTheStream) {
+  UploadParticlesHandler bad(backend_);
+  v1::UploadParticlesRequest chunk;
+  chunk.set_chunk("abc");
+  const auto answer = bad.OnRequest(chunk);
+  ASSERT_TRUE(answer.has_value());
+  EXPECT_EQ(answer->status().code(), absl::StatusCode::kInvalidArgument);
+
+  UploadParticlesHandler unfinished(backend_);
+  EXPECT_EQ(unfinished.OnEndOfRequests().status().code(), absl::StatusCode::kInvalidArgument);
+}
+
+TEST_F(Handlers, FrameArrivesAsHeaderChunksWithoutGapsAndTrailer) {
+  v1::RenderFrameRequest request = MakeRequest();
+  request.mutable_scene()->mutable_camera()->set_width(300);
+  request.mutable_scene()->mutable_camera()->set_height(200);
+  request.add_outputs()->set_kind(v1::OUTPUT_KIND_DEPTH);
+  FakeSink<v1::RenderFrameResponse> sink;
+  const auto handler = std::make_shared<RenderFrameHandler>(backend_, sink);
+  handler->Start(request);
+  while (sink.WaitForWrite()) {
+    handler->OnWritten(true);
+  }
+  EXPECT_TRUE(sink.finished()->ok()) << *sink.finished();
+
+  const auto messages = sink.written();
+  ASSERT_GE(messages.size(), 3U);
+  ASSERT_TRUE(messages.front().has_header());
+  ASSERT_TRUE(messages.back().has_trailer());
+  std::vector<std::string> outputs(2);
+  uint32_t last_index = 0;
+  for (size_t i = 1; i + 1 < messages.size(); ++i) {
+    ASSERT_TRUE(messages[i].has_chunk());
+    const v1::OutputChunk& chunk = messages[i].chunk();
+    EXPECT_GE(chunk.output_index(), last_index);
+    EXPECT_EQ(chunk.offset(), outputs.at(chunk.output_index()).size());
+    EXPECT_LE(chunk.data().size(), 256U * 1024U);
+    EXPECT_FALSE(chunk.data().empty());
+    last_index = chunk.output_index();
+    outputs[last_index] += chunk.data();
+  }
+  for (int i = 0; i < 2; ++i) {
+    EXPECT_EQ(outputs[i].size(), messages.front().header().outputs(i).byte_size());
+    EXPECT_EQ(Sha256Of(outputs[i]), messages.back().trailer().output_sha256(i));
+  }
+}
+
+TEST_F(Handlers, InvalidFrameIsRefusedWithoutRendering) {
+  v1::RenderFrameRequest request = MakeRequest();
+  request.clear_outputs();
+  FakeSink<v1::RenderFrameResponse> sink;
+  const auto handler = std::make_shared<RenderFrameHandler>(backend_, sink);
+  handler->Start(request);
+  ASSERT_TRUE(sink.finished().has_value());
+  EXPECT_EQ(sink.finished()->code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_EQ(engine_.rendered(), 0);
+}
+
+TEST_F(Handlers, CancelledFrameEndsAsCancelled) {
+  engine_.SetGate(false);
+  FakeSink<v1::RenderFrameResponse> sink;
+  const auto handler = std::make_shared<RenderFrameHandler>(backend_, sink);
+  handler->Start(MakeRequest());
+  handler->OnCancel();
+  EXPECT_FALSE(sink.WaitForWrite());
+  EXPECT_EQ(sink.finished()->code(), absl::StatusCode::kCancelled);
+}
+
+TEST_F(Handlers, PeerThatLeavesInTheMiddleEndsTheFrame) {
+  FakeSink<v1::RenderFrameResponse> sink;
+  const auto handler = std::make_shared<RenderFrameHandler>(backend_, sink);
+  handler->Start(MakeRequest());
+  ASSERT_TRUE(sink.WaitForWrite());
+  handler->OnWritten(false);
+  ASSERT_TRUE(sink.finished().has_value());
+  EXPECT_EQ(sink.written().size(), 1U);
+}
+
+class Sequence : public Handlers {
+ protected:
+  static v1::RenderSequenceRequest Wrap(const v1::RenderFrameRequest& frame) {
+    v1::RenderSequenceRequest request;
+    *request.mutable_frame() = frame;
+    return request;
+  }
+
+  // A request that changes nothing.
+  static v1::RenderSequenceRequest Same(const std::string& id = "") {
+    v1::RenderSequenceRequest request;
+    request.mutable_frame()->set_request_id(id);
+    return request;
+  }
+
+  // Plays a peer that sends these requests as they are asked for, and reads everything.
+  void Play(const std::vector<v1::RenderSequenceRequest>& requests) {
+    handler_->Start();
+    std::jthread sender([&] {
+      for (size_t i = 0; i <= requests.size(); ++i) {
+        if (!WaitFor([&] {
+              return sink_.reads() > static_cast<int>(i) || sink_.finished().has_value();
+            }) ||
+            sink_.finished().has_value()) {
+          return;
+        }
+        if (i < requests.size()) {
+          handler_->OnRequest(requests[i]);
+        } else {
+          handler_->OnEndOfRequests();
+        }
+      }
+    });
+    while (sink_.WaitForWrite()) {
+      handler_->OnWritten(true);
+    }
+  }
+
+  // The ids of the frames whose headers came, in order.
+  std::vector<std::string> Ids() {
+    std::vector<std::string> ids;
+    for (const auto& message : sink_.written()) {
+      if (message.has_header()) {
+        ids.push_back(message.header().metadata().request_id());
+      }
+    }
+    return ids;
+  }
+
+  FakeSink<v1::RenderSequenceResponse> sink_;
+  std::shared_ptr<RenderSequenceHandler> handler_ =
+      std::make_shared<RenderSequenceHandler>(backend_, sink_);
+};
+
+TEST_F(Sequence, FramesComeWholeAndInOrder) {
+  std::vector<v1::RenderSequenceRequest> requests = {Wrap(MakeRequest())};
+  for (int i = 1; i < 20; ++i) {
+    requests.push_back(Same());
+  }
+  Play(requests);
+  EXPECT_TRUE(sink_.finished()->ok()) << *sink_.finished();
+  uint64_t frame = 0;
+  bool inside = false;
+  for (const auto& message : sink_.written()) {
+    EXPECT_EQ(message.frame_index(), frame);
+    EXPECT_EQ(message.has_header(), !inside);
+    inside = !message.has_trailer();
+    frame += message.has_trailer() ? 1 : 0;
+  }
+  EXPECT_EQ(frame, 20U);
+}
+
+TEST_F(Sequence, UnsetPartsAreThoseOfTheRequestBefore) {
+  v1::RenderFrameRequest first = MakeRequest();
+  first.mutable_scene()->mutable_shadow()->set_slices(7);
+  v1::RenderFrameRequest second;
+  second.mutable_scene()->mutable_camera()->mutable_look_at()->mutable_eye()->set_x(3.0);
+  second.mutable_scene()->mutable_camera()->mutable_look_at()->mutable_target();
+  v1::RenderFrameRequest third;
+  *third.mutable_scene()->mutable_inline_particles() =
+      MakeParticles(5, {v1::PARTICLE_ATTRIBUTE_POSITION, v1::PARTICLE_ATTRIBUTE_RADIUS});
+  third.add_outputs()->set_kind(v1::OUTPUT_KIND_COVERAGE);
+  Play({Wrap(first), Wrap(second), Wrap(third), Same()});
+  ASSERT_TRUE(sink_.finished()->ok()) << *sink_.finished();
+  const FrameRequest last = engine_.last_request();
+  EXPECT_EQ(last.scene.shadow.slices, 7);
+  EXPECT_EQ(last.scene.particles->size(), 5U);
+  EXPECT_EQ(last.scene.lights.size(), 1U);
+  // A part replaces its predecessor as a whole: the size is that of an unset camera again.
+  EXPECT_EQ(last.scene.camera.width, 640);
+  EXPECT_EQ(last.scene.camera.view_from_world[3][2], -3.0);
+  ASSERT_EQ(last.images.size(), 1U);
+  EXPECT_EQ(last.images[0].kind, ImageKind::kCoverage);
+}
+
+TEST_F(Sequence, ParticlesOfTheStreamSurviveTheirEviction) {
+  ParticleStore small(2 * 16);
+  Backend backend{engine_.device(), limits_, version_, small, upload_memory_, pipeline_};
+  const auto particles = BuildInlineParticles(MakeRequest().scene().inline_particles(), limits_);
+  small.Insert(particles->sha256, particles->set);
+  handler_ = std::make_shared<RenderSequenceHandler>(backend, sink_);
+  v1::RenderFrameRequest first = MakeRequest();
+  first.mutable_scene()->set_particle_sha256(particles->sha256);
+  handler_->Start();
+  handler_->OnRequest(Wrap(first));
+  small.Insert(std::string(32, 'x'), std::make_shared<ParticleSet>(*particles->set));
+  ASSERT_FALSE(small.Touch(particles->sha256));
+  handler_->OnRequest(Same());
+  handler_->OnEndOfRequests();
+  while (sink_.WaitForWrite()) {
+    handler_->OnWritten(true);
+  }
+  EXPECT_TRUE(sink_.finished()->ok()) << *sink_.finished();
+}
+
+TEST_F(Sequence, ErrorNamesItsFrameAfterAllFramesBeforeIt) {
+  v1::RenderFrameRequest bad;
+  bad.mutable_scene()->mutable_shadow()->set_slices(4000000000U);
+  Play({Wrap(MakeRequest()), Same(), Wrap(bad), Same()});
+  EXPECT_EQ(sink_.finished()->code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_THAT(std::string(sink_.finished()->message()),
+              StartsWith("frame 2: scene.shadow.slices: 4000000000"));
+  EXPECT_EQ(Ids().size(), 2U);
+  EXPECT_TRUE(sink_.written().back().has_trailer());
+}
+
+TEST_F(Sequence, FirstRequestMustBeComplete) {
+  Play({Same()});
+  EXPECT_THAT(std::string(sink_.finished()->message()),
+              StartsWith("frame 0: scene.particles: unset"));
+}
+
+TEST_F(Sequence, EmptyStreamEndsWell) {
+  Play({});
+  EXPECT_TRUE(sink_.finished()->ok());
+}
+
+TEST_F(Sequence, FullQueueKeepsItsHint) {
+  engine_.RefuseWith(absl::ResourceExhaustedError("full"));
+  Play({Wrap(MakeRequest())});
+  EXPECT_EQ(sink_.finished()->code(), absl::StatusCode::kResourceExhausted);
+  EXPECT_TRUE(RetryHint(*sink_.finished()).has_value());
+}
+
+TEST_F(Sequence, SlowReaderStopsTheReadingAhead) {
+  handler_->Start();
+  handler_->OnRequest(Wrap(MakeRequest()));
+  for (int i = 1; i < static_cast<int>(kFramesAhead); ++i) {
+    ASSERT_EQ(sink_.reads(), i + 1);
+    handler_->OnRequest(Same());
+  }
+  // All frames are rendered, the first header is being written, and the peer does not take it.
+  ASSERT_TRUE(WaitFor([&] { return engine_.rendered() == static_cast<int>(kFramesAhead); }));
+  EXPECT_EQ(sink_.reads(), static_cast<int>(kFramesAhead)) << "it asks for more than it may hold";
+  // Once the first frame is through, it asks for one more.
+  while (sink_.reads() == static_cast<int>(kFramesAhead)) {
+    ASSERT_TRUE(sink_.WaitForWrite());
+    handler_->OnWritten(true);
+  }
+  EXPECT_TRUE(sink_.written().back().has_trailer() || sink_.written().back().has_header());
+  handler_->OnEndOfRequests();
+  while (sink_.WaitForWrite()) {
+    handler_->OnWritten(true);
+  }
+  EXPECT_EQ(Ids().size(), kFramesAhead);
+}
+
+TEST_F(Sequence, CancellationStopsEverythingThatWaits) {
+  engine_.SetGate(false);
+  handler_->Start();
+  handler_->OnRequest(Wrap(MakeRequest()));
+  handler_->OnRequest(Same());
+  handler_->OnCancel();
+  EXPECT_EQ(sink_.WaitForFinish().code(), absl::StatusCode::kCancelled);
+  EXPECT_TRUE(WaitFor([&] { return engine_.waiting() == 0; }));
+  EXPECT_EQ(engine_.rendered(), 0);
+  // What arrives after the end is left alone.
+  handler_->OnEndOfRequests();
+}
+
+TEST_F(Sequence, PeerThatLeavesDuringAWriteEndsTheStream) {
+  handler_->Start();
+  handler_->OnRequest(Wrap(MakeRequest()));
+  ASSERT_TRUE(sink_.WaitForWrite());
+  handler_->OnWritten(false);
+  handler_->OnEndOfRequests();
+  EXPECT_EQ(sink_.WaitForFinish().code(), absl::StatusCode::kCancelled);
+}
+
+TEST_F(Sequence, CancellationAtAnyMomentFinishesOnce) {
+  for (int round = 0; round < 200; ++round) {
+    FakeSink<v1::RenderSequenceResponse> sink;
+    auto handler = std::make_shared<RenderSequenceHandler>(backend_, sink);
+    handler->Start();
+    handler->OnRequest(Wrap(MakeRequest()));
+    std::jthread canceller([&, round] {
+      std::this_thread::sleep_for(std::chrono::microseconds(5 * round));
+      handler->OnCancel();
+    });
+    handler->OnRequest(Same());
+    while (sink.WaitForWrite()) {
+      handler->OnWritten(true);
+    }
+    EXPECT_EQ(sink.WaitForFinish().code(), absl::StatusCode::kCancelled);
+  }
+}
+
+}  // namespace
+}  // namespace halflight

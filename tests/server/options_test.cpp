@@ -1,0 +1,92 @@
+// The command line of halflightd: what is taken and how bad values are told.
+
+#include "server/options.h"
+
+#include <sstream>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "server/unix_socket.h"
+
+namespace halflight {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+absl::StatusOr<std::optional<Options>> Parse(std::vector<const char*> arguments,
+                                             std::ostringstream* out = nullptr) {
+  std::ostringstream ignored;
+  arguments.insert(arguments.begin(), "halflightd");
+  return ParseOptions(static_cast<int>(arguments.size()), arguments.data(),
+                      out != nullptr ? *out : ignored);
+}
+
+std::string ErrorOf(const std::vector<const char*>& arguments) {
+  const auto options = Parse(arguments);
+  EXPECT_EQ(options.status().code(), absl::StatusCode::kInvalidArgument);
+  return std::string(options.status().message());
+}
+
+TEST(Options, WithoutFlagsAreComplete) {
+  const auto options = Parse({});
+  ASSERT_TRUE(options.ok() && options->has_value()) << options.status();
+  EXPECT_THAT((*options)->addresses, ElementsAre("127.0.0.1:50551"));
+  EXPECT_GE((*options)->encode_threads, 1);
+}
+
+TEST(Options, TakeSeveralAddressesAndSizesWithSuffixes) {
+  const auto options =
+      Parse({"--address", "0.0.0.0:0", "--address", "unix:/tmp/x", "--max-cache-bytes", "3GiB",
+             "--max-particle-bytes", "64MiB", "--max-slices", "77", "--drain-seconds", "5"});
+  ASSERT_TRUE(options.ok() && options->has_value()) << options.status();
+  EXPECT_THAT((*options)->addresses, ElementsAre("0.0.0.0:0", "unix:/tmp/x"));
+  EXPECT_EQ((*options)->limits.max_cache_bytes, 3 * kGiB);
+  EXPECT_EQ((*options)->limits.max_particle_bytes, 64 * kMiB);
+  EXPECT_EQ((*options)->limits.max_slices, 77U);
+  EXPECT_EQ((*options)->drain_seconds, 5);
+}
+
+TEST(Options, HelpNamesEveryFlagAndRunsNothing) {
+  std::ostringstream out;
+  const auto options = Parse({"--help"}, &out);
+  ASSERT_TRUE(options.ok());
+  EXPECT_FALSE(options->has_value());
+  for (const char* flag :
+       {"--address", "--device", "--log-level", "--encode-threads", "--drain-seconds", "--version",
+        "--max-particles", "--max-particle-bytes", "--max-cache-bytes", "--max-image-size",
+        "--max-light-buffer-size", "--max-slices", "--max-lights", "--max-outputs",
+        "--max-output-bytes", "--max-queued-frames", "--max-message-bytes"}) {
+    EXPECT_THAT(out.str(), HasSubstr(flag));
+  }
+}
+
+TEST(Options, ErrorsNameFlagValueAndWhatIsAllowed) {
+  EXPECT_THAT(ErrorOf({"--address", "nonsense"}), HasSubstr("--address: nonsense, allowed: "));
+  EXPECT_THAT(ErrorOf({"--address", "host:70000"}), HasSubstr("--address: host:70000"));
+  EXPECT_THAT(ErrorOf({"--address", "unix:"}), HasSubstr("--address: unix:"));
+  EXPECT_THAT(ErrorOf({"--address", "a:1", "--address", "a:1"}), HasSubstr("a:1 twice"));
+  EXPECT_THAT(ErrorOf({"--log-level", "loud"}),
+              HasSubstr("--log-level: loud, allowed: trace, debug"));
+  EXPECT_THAT(ErrorOf({"--max-image-size", "0"}), HasSubstr("--max-image-size: 0, allowed: [1,"));
+  EXPECT_THAT(ErrorOf({"--max-message-bytes", "1000"}), HasSubstr("--max-message-bytes: 1000"));
+  EXPECT_THAT(ErrorOf({"--max-queued-frames", "-3"}), HasSubstr("--max-queued-frames"));
+  EXPECT_THAT(ErrorOf({"--max-cache-bytes", "1MiB", "--max-particle-bytes", "2MiB"}),
+              HasSubstr("--max-cache-bytes: 1048576, allowed: at least --max-particle-bytes"));
+  EXPECT_THAT(ErrorOf({"--drain-seconds", "-1"}), HasSubstr("--drain-seconds"));
+  EXPECT_THAT(ErrorOf({"--no-such-flag"}), HasSubstr("--no-such-flag"));
+  EXPECT_THAT(ErrorOf({"stray"}), HasSubstr("stray"));
+}
+
+TEST(LimitsOnDevice, NeverExceedWhatTheDeviceCanHold) {
+  DeviceInfo device;
+  device.max_texture_size = 2048;
+  const ServerLimits limits = LimitsOnDevice({}, device);
+  EXPECT_EQ(limits.max_image_size, 2048U);
+  EXPECT_EQ(limits.max_light_buffer_size, 2048U);
+}
+
+}  // namespace
+}  // namespace halflight

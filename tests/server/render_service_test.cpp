@@ -1,0 +1,350 @@
+// The service behind a real gRPC server in this process, with a fake engine.
+
+#include "server/render_service.h"
+
+#include <memory>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <grpcpp/generic/generic_stub.h>
+#include <grpcpp/grpcpp.h>
+#include <gtest/gtest.h>
+
+#include "halflight/particle_payload.h"
+#include "halflight/v1/service.grpc.pb.h"
+#include "server/grpc_server.h"
+#include "tests/server/fake_engine.h"
+
+namespace halflight {
+namespace {
+
+using testing::FakeEngine;
+using ::testing::HasSubstr;
+using testing::MakeParticles;
+using testing::MakeRequest;
+using testing::WaitFor;
+
+absl::StatusOr<EncodedImage> EncodePlain(const Image& image, ImageKind /*kind*/,
+                                         LightQuantity /*quantity*/,
+                                         const EncodeSettings& /*settings*/,
+                                         const ImageMetadata& /*metadata*/) {
+  EncodedImage encoded{.bytes = {}, .media_type = "test/plain", .white_black = {}};
+  encoded.bytes.assign(reinterpret_cast<const char*>(image.pixels.data()),
+                       image.pixels.size() * sizeof(float));
+  return encoded;
+}
+
+class Service : public ::testing::Test {
+ protected:
+  Service() {
+    auto server = GrpcServer::Start({"127.0.0.1:0"}, backend_);
+    EXPECT_TRUE(server.ok()) << server.status();
+    server_ = *std::move(server);
+    channel_ = grpc::CreateChannel(server_->addresses()[0], grpc::InsecureChannelCredentials());
+    stub_ = v1::RenderService::NewStub(channel_);
+  }
+
+  // A frame of several MiB, so that it cannot fit into the buffers on its way.
+  static v1::RenderFrameRequest LargeRequest() {
+    v1::RenderFrameRequest request = MakeRequest();
+    request.mutable_scene()->mutable_camera()->set_width(1024);
+    request.mutable_scene()->mutable_camera()->set_height(1024);
+    return request;
+  }
+
+  grpc::Status RenderAll(const v1::RenderFrameRequest& request) {
+    grpc::ClientContext context;
+    auto reader = stub_->RenderFrame(&context, request);
+    v1::RenderFrameResponse response;
+    while (reader->Read(&response)) {
+    }
+    return reader->Finish();
+  }
+
+  FakeEngine engine_;
+  ServerLimits limits_;
+  std::string version_ = "1.2.3";
+  ParticleStore store_{1 << 20};
+  ByteBudget upload_memory_{1 << 20};
+  FramePipeline pipeline_{engine_,
+                          {.max_queued_frames = 2, .encode_threads = 2, .encode = EncodePlain}};
+  Backend backend_{engine_.device(), limits_, version_, store_, upload_memory_, pipeline_};
+  std::unique_ptr<GrpcServer> server_;
+  std::shared_ptr<grpc::Channel> channel_;
+  std::unique_ptr<v1::RenderService::Stub> stub_;
+};
+
+TEST_F(Service, FrameBytesMatchTheTrailer) {
+  grpc::ClientContext context;
+  auto reader = stub_->RenderFrame(&context, LargeRequest());
+  v1::RenderFrameResponse response;
+  v1::FrameHeader header;
+  v1::FrameTrailer trailer;
+  std::string bytes;
+  while (reader->Read(&response)) {
+    if (response.has_header()) {
+      header = response.header();
+    } else if (response.has_chunk()) {
+      bytes += response.chunk().data();
+    } else {
+      trailer = response.trailer();
+    }
+  }
+  const grpc::Status status = reader->Finish();
+  ASSERT_TRUE(status.ok()) << status.error_message();
+  EXPECT_EQ(bytes.size(), 1024U * 1024U * 16U);
+  EXPECT_EQ(header.outputs(0).byte_size(), bytes.size());
+  ASSERT_EQ(trailer.output_sha256_size(), 1);
+  EXPECT_EQ(trailer.output_sha256(0), Sha256Of(bytes));
+}
+
+TEST_F(Service, CancelledInMidStreamTheServerLetsGoAndLivesOn) {
+  for (int round = 0; round < 20; ++round) {
+    grpc::ClientContext context;
+    auto reader = stub_->RenderFrame(&context, LargeRequest());
+    v1::RenderFrameResponse response;
+    for (int i = 0; i < round % 5; ++i) {
+      ASSERT_TRUE(reader->Read(&response));
+    }
+    context.TryCancel();
+    EXPECT_EQ(reader->Finish().error_code(), grpc::StatusCode::CANCELLED);
+  }
+  EXPECT_TRUE(WaitFor([this] { return server_->idle(); }));
+  EXPECT_TRUE(RenderAll(MakeRequest()).ok());
+}
+
+TEST_F(Service, DeadlineStopsAFrameThatWaits) {
+  engine_.SetGate(false);
+  grpc::ClientContext context;
+  context.set_deadline(std::chrono::system_clock::now() + std::chrono::milliseconds(100));
+  auto reader = stub_->RenderFrame(&context, MakeRequest());
+  v1::RenderFrameResponse response;
+  EXPECT_FALSE(reader->Read(&response));
+  EXPECT_EQ(reader->Finish().error_code(), grpc::StatusCode::DEADLINE_EXCEEDED);
+  EXPECT_TRUE(WaitFor([this] { return engine_.waiting() == 0; })) << "the work was not stopped";
+  EXPECT_EQ(engine_.rendered(), 0);
+}
+
+TEST_F(Service, FullQueueSaysWhenToRetry) {
+  engine_.SetGate(false);
+  std::vector<std::jthread> clients;
+  for (int i = 0; i < 2; ++i) {
+    clients.emplace_back([this] { EXPECT_TRUE(RenderAll(MakeRequest()).ok()); });
+  }
+  ASSERT_TRUE(WaitFor([this] { return engine_.waiting() == 2; }));
+  grpc::ClientContext context;
+  auto reader = stub_->RenderFrame(&context, MakeRequest());
+  v1::RenderFrameResponse response;
+  EXPECT_FALSE(reader->Read(&response));
+  EXPECT_EQ(reader->Finish().error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED);
+  EXPECT_EQ(context.GetServerTrailingMetadata().count("grpc-retry-pushback-ms"), 1U);
+  engine_.SetGate(true);
+}
+
+TEST_F(Service, SequenceComesInOrderWhileRequestsGoOn) {
+  grpc::ClientContext context;
+  auto stream = stub_->RenderSequence(&context);
+  std::jthread writer([&] {
+    for (int i = 0; i < 30; ++i) {
+      v1::RenderSequenceRequest request;
+      if (i == 0) {
+        *request.mutable_frame() = MakeRequest();
+      }
+      request.mutable_frame()->set_request_id(std::to_string(i));
+      if (!stream->Write(request)) {
+        break;
+      }
+    }
+    stream->WritesDone();
+  });
+  v1::RenderSequenceResponse response;
+  int frames = 0;
+  while (stream->Read(&response)) {
+    EXPECT_EQ(response.frame_index(), static_cast<uint64_t>(frames));
+    if (response.has_header()) {
+      EXPECT_EQ(response.header().metadata().request_id(), std::to_string(frames));
+    }
+    frames += response.has_trailer() ? 1 : 0;
+  }
+  writer.join();
+  const grpc::Status status = stream->Finish();
+  // Though the queue of two is shorter than what the stream may have under way.
+  EXPECT_TRUE(status.ok()) << status.error_message();
+  EXPECT_EQ(frames, 30);
+}
+
+TEST_F(Service, SequenceCancelledInMidStreamEnds) {
+  for (int round = 0; round < 20; ++round) {
+    grpc::ClientContext context;
+    auto stream = stub_->RenderSequence(&context);
+    v1::RenderSequenceRequest request;
+    *request.mutable_frame() = LargeRequest();
+    ASSERT_TRUE(stream->Write(request));
+    v1::RenderSequenceResponse response;
+    if (round % 2 == 0) {
+      ASSERT_TRUE(stream->Read(&response));
+    }
+    context.TryCancel();
+    EXPECT_EQ(stream->Finish().error_code(), grpc::StatusCode::CANCELLED);
+  }
+  EXPECT_TRUE(WaitFor([this] { return server_->idle(); }));
+}
+
+TEST_F(Service, UploadedSetIsFoundAndRendered) {
+  const v1::InlineParticles particles =
+      MakeParticles(1000, {v1::PARTICLE_ATTRIBUTE_POSITION, v1::PARTICLE_ATTRIBUTE_RADIUS});
+  Sha256 digest = BeginParticleDigest(particles.layout());
+  digest.Update(particles.payload());
+  const std::string sha256 = digest.Finish();
+  v1::FindMissingParticlesRequest question;
+  question.add_sha256(sha256);
+  {
+    grpc::ClientContext context;
+    v1::FindMissingParticlesResponse missing;
+    ASSERT_TRUE(stub_->FindMissingParticles(&context, question, &missing).ok());
+    EXPECT_EQ(missing.missing_sha256_size(), 1);
+  }
+  for (const bool again : {false, true}) {
+    grpc::ClientContext context;
+    v1::UploadParticlesResponse response;
+    auto writer = stub_->UploadParticles(&context, &response);
+    v1::UploadParticlesRequest part;
+    *part.mutable_header()->mutable_layout() = particles.layout();
+    part.mutable_header()->set_byte_size(particles.payload().size());
+    part.mutable_header()->set_sha256(sha256);
+    writer->Write(part);
+    part.set_chunk(particles.payload());
+    writer->Write(part);
+    part.mutable_finish()->set_byte_size(particles.payload().size());
+    part.mutable_finish()->set_sha256(sha256);
+    writer->Write(part);
+    writer->WritesDone();
+    const grpc::Status status = writer->Finish();
+    ASSERT_TRUE(status.ok()) << status.error_message();
+    EXPECT_EQ(response.already_present(), again);
+  }
+  v1::RenderFrameRequest request = MakeRequest();
+  request.mutable_scene()->set_particle_sha256(sha256);
+  EXPECT_TRUE(RenderAll(request).ok());
+  EXPECT_EQ(engine_.last_request().scene.particles->size(), 1000U);
+}
+
+TEST_F(Service, UploadWithAMalformedMessageCommitsNothing) {
+  const v1::InlineParticles particles =
+      MakeParticles(10, {v1::PARTICLE_ATTRIBUTE_POSITION, v1::PARTICLE_ATTRIBUTE_RADIUS});
+  Sha256 digest = BeginParticleDigest(particles.layout());
+  digest.Update(particles.payload());
+  const std::string sha256 = digest.Finish();
+  v1::UploadParticlesRequest header;
+  *header.mutable_header()->mutable_layout() = particles.layout();
+  header.mutable_header()->set_byte_size(particles.payload().size());
+  header.mutable_header()->set_sha256(sha256);
+  v1::UploadParticlesRequest chunk;
+  chunk.set_chunk(particles.payload());
+
+  grpc::GenericStub generic(channel_);
+  grpc::CompletionQueue queue;
+  grpc::ClientContext context;
+  auto call = generic.PrepareCall(&context, "/halflight.v1.RenderService/UploadParticles", &queue);
+  const auto wait = [&queue] {
+    void* tag = nullptr;
+    bool ok = false;
+    queue.Next(&tag, &ok);
+    return ok;
+  };
+  call->StartCall(nullptr);
+  wait();
+  for (const std::string& bytes : {header.SerializeAsString(), chunk.SerializeAsString(),
+                                   std::string("\x0a\xff not a message")}) {
+    const grpc::Slice slice(bytes);
+    call->Write(grpc::ByteBuffer(&slice, 1), nullptr);
+    wait();
+  }
+  grpc::Status status;
+  call->Finish(&status, nullptr);
+  wait();
+  EXPECT_FALSE(status.ok());
+  EXPECT_FALSE(store_.Touch(sha256));
+}
+
+TEST_F(Service, InvalidRequestNamesTheField) {
+  v1::RenderFrameRequest request = MakeRequest();
+  request.mutable_scene()->mutable_camera()->mutable_perspective()->set_vertical_fov_deg(200);
+  const grpc::Status status = RenderAll(request);
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
+  EXPECT_EQ(status.error_message(),
+            "scene.camera.perspective.vertical_fov_deg: 200, allowed: (0, 179)");
+}
+
+TEST_F(Service, DrainFinishesWhatRunsAndRefusesTheRest) {
+  engine_.SetGate(false);
+  std::jthread running([this] { EXPECT_TRUE(RenderAll(MakeRequest()).ok()); });
+  ASSERT_TRUE(WaitFor([this] { return engine_.waiting() == 1; }));
+  server_->BeginDrain();
+  EXPECT_EQ(RenderAll(MakeRequest()).error_code(), grpc::StatusCode::UNAVAILABLE);
+  EXPECT_FALSE(server_->idle());
+  engine_.SetGate(true);
+  running.join();
+  EXPECT_TRUE(WaitFor([this] { return server_->idle(); }));
+}
+
+TEST_F(Service, SecondServerOnTheSamePortIsRefused) {
+  const auto second = GrpcServer::Start(server_->addresses(), backend_);
+  ASSERT_FALSE(second.ok());
+  EXPECT_THAT(std::string(second.status().message()), HasSubstr(server_->addresses()[0]));
+}
+
+// One bytes request and one bytes answer on a stream of a service whose stubs are not built here.
+std::string AskOnce(const std::shared_ptr<grpc::Channel>& channel, const std::string& method,
+                    const std::string& request) {
+  grpc::GenericStub generic(channel);
+  grpc::CompletionQueue queue;
+  grpc::ClientContext context;
+  auto call = generic.PrepareCall(&context, method, &queue);
+  const auto wait = [&queue] {
+    void* tag = nullptr;
+    bool ok = false;
+    queue.Next(&tag, &ok);
+    return ok;
+  };
+  call->StartCall(nullptr);
+  wait();
+  const grpc::Slice slice(request);
+  call->WriteLast(grpc::ByteBuffer(&slice, 1), grpc::WriteOptions(), nullptr);
+  wait();
+  grpc::ByteBuffer answer;
+  call->Read(&answer, nullptr);
+  std::string bytes;
+  if (wait()) {
+    std::vector<grpc::Slice> slices;
+    answer.Dump(&slices);
+    for (const grpc::Slice& part : slices) {
+      bytes.append(reinterpret_cast<const char*>(part.begin()), part.size());
+    }
+  }
+  grpc::Status status;
+  call->Finish(&status, nullptr);
+  wait();
+  return bytes;
+}
+
+TEST_F(Service, ReflectionListsTheServiceAndHealth) {
+  // ServerReflectionRequest { list_services = 7: "" }.
+  const std::string listed =
+      AskOnce(channel_, "/grpc.reflection.v1alpha.ServerReflection/ServerReflectionInfo",
+              std::string("\x3a\x00", 2));
+  EXPECT_THAT(listed, HasSubstr("halflight.v1.RenderService"));
+  EXPECT_THAT(listed, HasSubstr("grpc.health.v1.Health"));
+}
+
+TEST_F(Service, HealthTurnsWhenTheDrainBegins) {
+  // HealthCheckResponse { status = 1 }: SERVING is 1, NOT_SERVING 2.
+  EXPECT_EQ(AskOnce(channel_, "/grpc.health.v1.Health/Check", ""), std::string("\x08\x01"));
+  server_->BeginDrain();
+  EXPECT_EQ(AskOnce(channel_, "/grpc.health.v1.Health/Check", ""), std::string("\x08\x02"));
+}
+
+}  // namespace
+}  // namespace halflight

@@ -1,0 +1,436 @@
+// Every request that is refused, and what it is told: path of the field, value, what is allowed.
+
+#include <cmath>
+#include <cstring>
+#include <functional>
+#include <limits>
+#include <string>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "server/convert/convert_frame.h"
+#include "tests/server/fake_engine.h"
+
+namespace halflight {
+namespace {
+
+using testing::MakeParticles;
+using testing::MakeRequest;
+using ::testing::StartsWith;
+using Request = v1::RenderFrameRequest;
+
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+constexpr double kInf = std::numeric_limits<double>::infinity();
+
+struct Refusal {
+  const char* name;
+  std::function<void(Request&)> change;
+  std::string message;  // how it starts
+};
+
+v1::Camera& CameraOf(Request& request) { return *request.mutable_scene()->mutable_camera(); }
+v1::Light& LightOf(Request& request) {
+  return *request.mutable_scene()->mutable_lighting()->mutable_lights(0);
+}
+v1::Material& MaterialOf(Request& request) { return *request.mutable_scene()->mutable_material(); }
+v1::Shadow& ShadowOf(Request& request) { return *request.mutable_scene()->mutable_shadow(); }
+v1::Output& OutputOf(Request& request) { return *request.mutable_outputs(0); }
+v1::InlineParticles& ParticlesOf(Request& request) {
+  return *request.mutable_scene()->mutable_inline_particles();
+}
+
+// A point light with shadows at (x, 0, 0); the particles of MakeRequest fit a sphere of radius 2.
+void UsePointLight(Request& request, double x) {
+  LightOf(request).mutable_point()->mutable_position()->set_x(x);
+}
+
+void UseMatrix(Request& request, const std::vector<double>& elements) {
+  auto& matrix = *CameraOf(request).mutable_world_to_camera();
+  matrix.clear_elements();
+  for (const double element : elements) {
+    matrix.add_elements(element);
+  }
+}
+
+void UseParticles(Request& request, const std::vector<v1::ParticleAttribute>& attributes) {
+  ParticlesOf(request) = MakeParticles(2, attributes);
+}
+
+// Overwrites one float of the payload.
+void Poke(Request& request, size_t index, double value) {
+  const auto narrowed = static_cast<float>(value);
+  std::memcpy(ParticlesOf(request).mutable_payload()->data() + index * sizeof(float), &narrowed,
+              sizeof(float));
+}
+
+class Validation : public ::testing::TestWithParam<Refusal> {};
+
+TEST_P(Validation, RefusesAndNamesFieldAndValue) {
+  Request request = MakeRequest();
+  GetParam().change(request);
+  ParticleStore store(1 << 20);
+  ServerLimits limits;
+  limits.max_image_size = 4096;
+  limits.max_lights = 2;
+  limits.max_outputs = 3;
+  limits.max_output_bytes = 64 * kMiB;
+  const auto job = ConvertRequest(request, store, limits);
+  ASSERT_FALSE(job.ok());
+  EXPECT_EQ(job.status().code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_THAT(std::string(job.status().message()), StartsWith(GetParam().message));
+  EXPECT_THAT(std::string(job.status().message()), ::testing::HasSubstr("allowed: "));
+}
+
+std::string NameOf(const ::testing::TestParamInfo<Refusal>& info) { return info.param.name; }
+
+INSTANTIATE_TEST_SUITE_P(
+    Camera, Validation,
+    ::testing::Values(
+        Refusal{"Unset", [](Request& r) { r.mutable_scene()->clear_camera(); },
+                "scene.camera: unset"},
+        Refusal{"ViewUnset", [](Request& r) { CameraOf(r).clear_view(); },
+                "scene.camera.view: unset"},
+        Refusal{"EyeUnset", [](Request& r) { CameraOf(r).mutable_look_at()->clear_eye(); },
+                "scene.camera.look_at.eye: unset"},
+        Refusal{"TargetUnset", [](Request& r) { CameraOf(r).mutable_look_at()->clear_target(); },
+                "scene.camera.look_at.target: unset"},
+        Refusal{"EyeNan",
+                [](Request& r) { CameraOf(r).mutable_look_at()->mutable_eye()->set_y(kNan); },
+                "scene.camera.look_at.eye.y: nan"},
+        Refusal{"EyeIsTarget",
+                [](Request& r) { CameraOf(r).mutable_look_at()->mutable_target()->set_z(10.0); },
+                "scene.camera.look_at.target: (0, 0, 10)"},
+        Refusal{"UpZero", [](Request& r) { CameraOf(r).mutable_look_at()->mutable_up(); },
+                "scene.camera.look_at.up: (0, 0, 0)"},
+        Refusal{"MatrixShort",
+                [](Request& r) {
+                  UseMatrix(r, {1, 0, 0});
+                },
+                "scene.camera.world_to_camera.elements: 3 numbers"},
+        Refusal{"MatrixInfinite",
+                [](Request& r) {
+                  UseMatrix(r, {1, 0, 0, kInf, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1});
+                },
+                "scene.camera.world_to_camera.elements[3]: inf"},
+        Refusal{"MatrixScales",
+                [](Request& r) {
+                  UseMatrix(r, {2, 0, 0, 0, 0, 2, 0, 0, 0, 0, 2, 0, 0, 0, 0, 1});
+                },
+                "scene.camera.world_to_camera: "},
+        Refusal{"MatrixMirrors",
+                [](Request& r) {
+                  UseMatrix(r, {-1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1});
+                },
+                "scene.camera.world_to_camera: "},
+        Refusal{"MatrixProjects",
+                [](Request& r) {
+                  UseMatrix(r, {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 1, 1});
+                },
+                "scene.camera.world_to_camera: "},
+        Refusal{"FovTooWide",
+                [](Request& r) { CameraOf(r).mutable_perspective()->set_vertical_fov_deg(200); },
+                "scene.camera.perspective.vertical_fov_deg: 200, allowed: (0, 179)"},
+        Refusal{"FovAtTheEnd",
+                [](Request& r) { CameraOf(r).mutable_perspective()->set_vertical_fov_deg(179); },
+                "scene.camera.perspective.vertical_fov_deg: 179"},
+        Refusal{"FovNegative",
+                [](Request& r) { CameraOf(r).mutable_perspective()->set_vertical_fov_deg(-1); },
+                "scene.camera.perspective.vertical_fov_deg: -1"},
+        Refusal{"FovNan",
+                [](Request& r) { CameraOf(r).mutable_perspective()->set_vertical_fov_deg(kNan); },
+                "scene.camera.perspective.vertical_fov_deg: nan"},
+        Refusal{"OrthographicWithoutHeight", [](Request& r) { CameraOf(r).mutable_orthographic(); },
+                "scene.camera.orthographic.height: 0"},
+        Refusal{"TooWide", [](Request& r) { CameraOf(r).set_width(4097); },
+                "scene.camera.width: 4097, allowed: [1, 4096]"},
+        Refusal{"TooHigh", [](Request& r) { CameraOf(r).set_height(4294967295U); },
+                "scene.camera.height: 4294967295"},
+        Refusal{"CropEmpty", [](Request& r) { CameraOf(r).mutable_crop(); },
+                "scene.camera.crop.width: pixels [0, 0)"},
+        Refusal{"CropOutside",
+                [](Request& r) {
+                  CameraOf(r).mutable_crop()->set_x(60);
+                  CameraOf(r).mutable_crop()->set_width(5);
+                  CameraOf(r).mutable_crop()->set_height(5);
+                },
+                "scene.camera.crop.width: pixels [60, 65)"},
+        Refusal{"CropOverflows",
+                [](Request& r) {
+                  CameraOf(r).mutable_crop()->set_width(1);
+                  CameraOf(r).mutable_crop()->set_y(4294967295U);
+                  CameraOf(r).mutable_crop()->set_height(2);
+                },
+                "scene.camera.crop.height: pixels [4294967295, 4294967297)"},
+        Refusal{"SupersampleZero",
+                [](Request& r) { r.mutable_scene()->mutable_sampling()->set_supersample(0); },
+                "scene.sampling.supersample: 0, allowed: [1, 8]"},
+        Refusal{"DownsampleTooHigh",
+                [](Request& r) { r.mutable_scene()->mutable_sampling()->set_downsample(9); },
+                "scene.sampling.downsample: 9"},
+        Refusal{"SupersampledTooLarge",
+                [](Request& r) {
+                  CameraOf(r).set_width(2049);
+                  r.mutable_scene()->mutable_sampling()->set_supersample(2);
+                },
+                "scene.sampling.supersample: 2 with a window of 2049 x 48"}),
+    NameOf);
+
+INSTANTIATE_TEST_SUITE_P(
+    Lights, Validation,
+    ::testing::Values(
+        Refusal{"TooMany",
+                [](Request& r) {
+                  r.mutable_scene()->mutable_lighting()->add_lights();
+                  r.mutable_scene()->mutable_lighting()->add_lights();
+                },
+                "scene.lighting.lights: 3 lights, allowed: at most 2"},
+        Refusal{"KindUnset", [](Request& r) { LightOf(r).clear_kind(); },
+                "scene.lighting.lights[0].kind: unset"},
+        Refusal{"DirectionZero",
+                [](Request& r) { LightOf(r).mutable_directional()->clear_direction(); },
+                "scene.lighting.lights[0].directional.direction: (0, 0, 0)"},
+        Refusal{
+            "DirectionNan",
+            [](Request& r) { LightOf(r).mutable_directional()->mutable_direction()->set_x(kNan); },
+            "scene.lighting.lights[0].directional.direction.x: nan"},
+        Refusal{"PositionUnset", [](Request& r) { LightOf(r).mutable_point(); },
+                "scene.lighting.lights[0].point.position: unset"},
+        Refusal{"PositionInfinite", [](Request& r) { UsePointLight(r, kInf); },
+                "scene.lighting.lights[0].point.position.x: inf"},
+        Refusal{"PointAmongTheParticles", [](Request& r) { UsePointLight(r, 0.5); },
+                "scene.lighting.lights[0].point.position: "},
+        Refusal{"ColorNegative", [](Request& r) { LightOf(r).mutable_color()->set_g(-1.0F); },
+                "scene.lighting.lights[0].color.g: -1, allowed: >= 0 and finite"},
+        Refusal{"DensityNegative", [](Request& r) { LightOf(r).set_density(-0.5F); },
+                "scene.lighting.lights[0].density: -0.5"},
+        Refusal{
+            "DensityOfOneChannelNan",
+            [](Request& r) { LightOf(r).mutable_density_rgb()->set_b(static_cast<float>(kNan)); },
+            "scene.lighting.lights[0].density_rgb.b: nan"}),
+    NameOf);
+
+INSTANTIATE_TEST_SUITE_P(
+    MaterialAndShadow, Validation,
+    ::testing::Values(
+        Refusal{"ProfileUnknown",
+                [](Request& r) { MaterialOf(r).set_profile(static_cast<v1::Profile>(9)); },
+                "scene.material.profile: 9, allowed: PROFILE_SOFT, PROFILE_BALL"},
+        Refusal{"RadiusMissing",
+                [](Request& r) { UseParticles(r, {v1::PARTICLE_ATTRIBUTE_POSITION}); },
+                "scene.material.radius: unset"},
+        Refusal{"RadiusZero",
+                [](Request& r) {
+                  UseParticles(r, {v1::PARTICLE_ATTRIBUTE_POSITION});
+                  MaterialOf(r).set_radius(0.0F);
+                },
+                "scene.material.radius: 0, allowed: > 0 and finite"},
+        Refusal{"OpacityAboveOne", [](Request& r) { MaterialOf(r).set_opacity(1.5F); },
+                "scene.material.opacity: 1.5, allowed: [0, 1]"},
+        Refusal{"AlbedoNegative", [](Request& r) { MaterialOf(r).mutable_albedo()->set_r(-0.5F); },
+                "scene.material.albedo.r: -0.5"},
+        Refusal{
+            "EmissionInfinite",
+            [](Request& r) { MaterialOf(r).mutable_emission()->set_r(static_cast<float>(kInf)); },
+            "scene.material.emission.r: inf"},
+        Refusal{"AmbientNegative",
+                [](Request& r) { MaterialOf(r).mutable_ambient()->set_b(-0.5F); },
+                "scene.material.ambient.b: -0.5"},
+        Refusal{"PhaseAtTheEnd", [](Request& r) { MaterialOf(r).set_phase_g(1.0F); },
+                "scene.material.phase_g: 1, allowed: (-1, 1)"},
+        Refusal{"SpreadNegative", [](Request& r) { MaterialOf(r).set_scattering_spread(-1.0F); },
+                "scene.material.scattering_spread: -1"},
+        Refusal{"TimeWithoutVelocity",
+                [](Request& r) { r.mutable_scene()->set_time_offset_s(0.5); },
+                "scene.time_offset_s: 0.5"},
+        Refusal{"TimeNan", [](Request& r) { r.mutable_scene()->set_time_offset_s(kNan); },
+                "scene.time_offset_s: nan"},
+        Refusal{"TechniqueUnknown",
+                [](Request& r) { ShadowOf(r).set_technique(static_cast<v1::ShadowTechnique>(99)); },
+                "scene.shadow.technique: 99, allowed: SHADOW_TECHNIQUE_HALF_ANGLE"},
+        Refusal{"SpacingUnknown",
+                [](Request& r) { ShadowOf(r).set_spacing(static_cast<v1::SliceSpacing>(-1)); },
+                "scene.shadow.spacing: -1"},
+        Refusal{"SlicesTooMany", [](Request& r) { ShadowOf(r).set_slices(65537); },
+                "scene.shadow.slices: 65537, allowed: [1, 65536]"},
+        Refusal{"LightBufferTooSmall", [](Request& r) { ShadowOf(r).set_light_buffer_size(15); },
+                "scene.shadow.light_buffer_size: 15, allowed: [16, 4096]"},
+        Refusal{"BlurModeUnknown",
+                [](Request& r) { ShadowOf(r).set_blur_mode(static_cast<v1::BlurMode>(5)); },
+                "scene.shadow.blur_mode: 5"},
+        Refusal{"BlurTexelsWithoutMode", [](Request& r) { ShadowOf(r).set_blur_texels(2.0F); },
+                "scene.shadow.blur_texels: 2, allowed: unset"},
+        Refusal{"BlurModeWithoutTexels",
+                [](Request& r) { ShadowOf(r).set_blur_mode(v1::BLUR_MODE_TEXELS_PER_SLICE); },
+                "scene.shadow.blur_texels: 0"},
+        Refusal{"BlurTooWide",
+                [](Request& r) {
+                  ShadowOf(r).set_blur_mode(v1::BLUR_MODE_TEXELS_PER_SLICE);
+                  ShadowOf(r).set_blur_texels(65.0F);
+                },
+                "scene.shadow.blur_texels: 65"}),
+    NameOf);
+
+INSTANTIATE_TEST_SUITE_P(
+    Outputs, Validation,
+    ::testing::Values(
+        Refusal{"None", [](Request& r) { r.clear_outputs(); }, "outputs: 0, allowed: [1, 3]"},
+        Refusal{"TooMany",
+                [](Request& r) {
+                  for (int i = 0; i < 3; ++i) {
+                    *r.add_outputs() = r.outputs(0);
+                  }
+                },
+                "outputs: 4"},
+        Refusal{"KindUnset", [](Request& r) { OutputOf(r).clear_kind(); },
+                "outputs[0].kind: unset"},
+        Refusal{"KindUnknown",
+                [](Request& r) { OutputOf(r).set_kind(static_cast<v1::OutputKind>(77)); },
+                "outputs[0].kind: 77"},
+        Refusal{"FormatUnknown",
+                [](Request& r) { OutputOf(r).set_format(static_cast<v1::ImageFormat>(77)); },
+                "outputs[0].format: 77"},
+        Refusal{"CompressionUnknown",
+                [](Request& r) {
+                  OutputOf(r).set_format(v1::IMAGE_FORMAT_EXR_HALF);
+                  OutputOf(r).set_compression(static_cast<v1::ExrCompression>(77));
+                },
+                "outputs[0].compression: 77"},
+        Refusal{"CompressionOfPng",
+                [](Request& r) { OutputOf(r).set_compression(v1::EXR_COMPRESSION_ZIP); },
+                "outputs[0].compression: 4, allowed: unset"},
+        Refusal{"QuantityOfBeauty",
+                [](Request& r) { OutputOf(r).set_quantity(v1::LIGHT_QUANTITY_OPTICAL_DEPTH); },
+                "outputs[0].quantity: 2, allowed: unset"},
+        Refusal{"QuantityUnknown",
+                [](Request& r) {
+                  OutputOf(r).set_kind(v1::OUTPUT_KIND_LIGHT_BUFFER);
+                  OutputOf(r).set_quantity(static_cast<v1::LightQuantity>(77));
+                },
+                "outputs[0].quantity: 77"},
+        Refusal{"LightOfBeauty", [](Request& r) { OutputOf(r).set_light_index(1); },
+                "outputs[0].light_index: 1, allowed: unset"},
+        Refusal{"LightOutOfRange",
+                [](Request& r) {
+                  OutputOf(r).set_kind(v1::OUTPUT_KIND_LIGHT_TRANSMITTANCE);
+                  OutputOf(r).set_light_index(1);
+                },
+                "outputs[0].light_index: 1, allowed: [0, 0]"},
+        Refusal{"LightWithoutShadows",
+                [](Request& r) {
+                  LightOf(r).set_density(0.0F);
+                  OutputOf(r).set_kind(v1::OUTPUT_KIND_LIGHT_BUFFER);
+                },
+                "outputs[0].light_index: 0, allowed: a light whose shadow density is not 0"},
+        Refusal{"LightOfADarkScene",
+                [](Request& r) {
+                  r.mutable_scene()->clear_lighting();
+                  OutputOf(r).set_kind(v1::OUTPUT_KIND_LIGHT_BUFFER);
+                },
+                "outputs[0].light_index: 0, allowed: nothing"},
+        Refusal{"TooManyBytes",
+                [](Request& r) {
+                  // 4096^2 texels of one float: exactly the limit; the second output goes over it.
+                  OutputOf(r).set_kind(v1::OUTPUT_KIND_LIGHT_BUFFER);
+                  ShadowOf(r).set_light_buffer_size(4096);
+                  r.add_outputs()->set_kind(v1::OUTPUT_KIND_COVERAGE);
+                },
+                "outputs: 67121152 bytes"},
+        Refusal{"TooManyBytesOfLayers",
+                [](Request& r) {
+                  // Two particles: two layers, of three channels.
+                  OutputOf(r).set_kind(v1::OUTPUT_KIND_LIGHT_LAYERS);
+                  LightOf(r).mutable_density_rgb()->set_r(1.0F);
+                  ShadowOf(r).set_light_buffer_size(2048);
+                },
+                "outputs: 100663296 bytes"},
+        Refusal{"RequestIdTooLong", [](Request& r) { r.set_request_id(std::string(129, 'a')); },
+                "request_id: 129 bytes"},
+        Refusal{"RequestIdUnprintable", [](Request& r) { r.set_request_id("a\nb"); },
+                "request_id: byte 0x0a at 1"}),
+    NameOf);
+
+INSTANTIATE_TEST_SUITE_P(
+    Particles, Validation,
+    ::testing::Values(
+        Refusal{"Unset", [](Request& r) { r.mutable_scene()->clear_particles(); },
+                "scene.particles: unset"},
+        Refusal{"NameTooShort", [](Request& r) { r.mutable_scene()->set_particle_sha256("abc"); },
+                "scene.particle_sha256: 3 bytes, allowed: 32 bytes"},
+        Refusal{"NoPosition", [](Request& r) { UseParticles(r, {v1::PARTICLE_ATTRIBUTE_RADIUS}); },
+                "scene.inline_particles.layout.attributes: no PARTICLE_ATTRIBUTE_POSITION"},
+        Refusal{"AttributeTwice",
+                [](Request& r) {
+                  ParticlesOf(r).mutable_layout()->add_attributes(v1::PARTICLE_ATTRIBUTE_RADIUS);
+                },
+                "scene.inline_particles.layout.attributes[2]: PARTICLE_ATTRIBUTE_RADIUS"},
+        Refusal{"AttributeUnknown",
+                [](Request& r) {
+                  ParticlesOf(r).mutable_layout()->add_attributes(
+                      static_cast<v1::ParticleAttribute>(40));
+                },
+                "scene.inline_particles.layout.attributes[2]: 40"},
+        Refusal{"OriginNan",
+                [](Request& r) { ParticlesOf(r).mutable_layout()->mutable_origin()->set_z(kNan); },
+                "scene.inline_particles.layout.origin.z: nan"},
+        Refusal{"PayloadShort", [](Request& r) { ParticlesOf(r).mutable_payload()->pop_back(); },
+                "scene.inline_particles.payload: 31 bytes, allowed: 32 bytes"},
+        Refusal{"PositionNan", [](Request& r) { Poke(r, 4, kNan); },
+                "scene.inline_particles.position[1].y: nan, allowed: finite"},
+        Refusal{"RadiusZero", [](Request& r) { Poke(r, 7, 0.0); },
+                "scene.inline_particles.radius[1]: 0, allowed: > 0 and finite"},
+        Refusal{"RadiusNegative", [](Request& r) { Poke(r, 6, -2.0); },
+                "scene.inline_particles.radius[0]: -2"},
+        Refusal{
+            "OpacityAboveOne",
+            [](Request& r) {
+              UseParticles(r, {v1::PARTICLE_ATTRIBUTE_POSITION, v1::PARTICLE_ATTRIBUTE_OPACITY});
+              Poke(r, 7, 1.25);
+            },
+            "scene.inline_particles.opacity[1]: 1.25, allowed: [0, 1]"},
+        Refusal{"ColorNegative",
+                [](Request& r) {
+                  UseParticles(r, {v1::PARTICLE_ATTRIBUTE_POSITION, v1::PARTICLE_ATTRIBUTE_COLOR});
+                  Poke(r, 11, -1.0);
+                },
+                "scene.inline_particles.color[1].b: -1"},
+        Refusal{
+            "VelocityInfinite",
+            [](Request& r) {
+              UseParticles(r, {v1::PARTICLE_ATTRIBUTE_POSITION, v1::PARTICLE_ATTRIBUTE_VELOCITY});
+              Poke(r, 6, kInf);
+            },
+            "scene.inline_particles.velocity[0].x: inf"}),
+    NameOf);
+
+TEST(Validation, PointLightMayStandAmongParticlesWhereNothingIsShadowed) {
+  Request request = MakeRequest();
+  UsePointLight(request, 0.5);
+  LightOf(request).set_density(0.0F);
+  ParticleStore store(1 << 20);
+  EXPECT_TRUE(ConvertRequest(request, store, ServerLimits{}).ok());
+  UsePointLight(request, 50.0);
+  LightOf(request).set_density(1.0F);
+  EXPECT_TRUE(ConvertRequest(request, store, ServerLimits{}).ok());
+}
+
+TEST(Validation, UnknownSetIsNotFoundByItsHexadecimalName) {
+  Request request = MakeRequest();
+  request.mutable_scene()->set_particle_sha256(std::string(32, '\xab'));
+  ParticleStore store(1 << 20);
+  const auto job = ConvertRequest(request, store, ServerLimits{});
+  EXPECT_EQ(job.status().code(), absl::StatusCode::kNotFound);
+  EXPECT_THAT(std::string(job.status().message()), ::testing::HasSubstr("abababab"));
+}
+
+TEST(Validation, TooManyParticlesAreRefusedForGood) {
+  Request request = MakeRequest();
+  ParticleStore store(1 << 20);
+  ServerLimits limits;
+  limits.max_particles = 1;
+  const auto job = ConvertRequest(request, store, limits);
+  EXPECT_EQ(job.status().code(), absl::StatusCode::kResourceExhausted);
+}
+
+}  // namespace
+}  // namespace halflight
