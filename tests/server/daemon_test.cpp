@@ -104,10 +104,8 @@ class Process {
 
 class Daemon : public ::testing::Test {
  protected:
-  Daemon() : folder_(::testing::TempDir() + "halflightd." + std::to_string(getpid())) {
-    fs::create_directories(folder_);
-  }
-  ~Daemon() override { fs::remove_all(folder_); }
+  void SetUp() override { fs::create_directories(folder_); }
+  void TearDown() override { fs::remove_all(folder_); }
 
   [[nodiscard]] std::string Path(const std::string& name) const { return folder_ + "/" + name; }
 
@@ -125,7 +123,7 @@ class Daemon : public ::testing::Test {
     return reader->Finish();
   }
 
-  const std::string folder_;
+  const std::string folder_ = ::testing::TempDir() + "halflightd." + std::to_string(getpid());
 };
 
 TEST_F(Daemon, FinishesWhatRunsOnSigtermAndExitsWell) {

@@ -20,6 +20,10 @@ class FakeEngine : public FrameEngine {
   FakeEngine();
   // Finishes what was accepted, the gate open.
   ~FakeEngine() override;
+  FakeEngine(const FakeEngine&) = delete;
+  FakeEngine& operator=(const FakeEngine&) = delete;
+  FakeEngine(FakeEngine&&) = delete;
+  FakeEngine& operator=(FakeEngine&&) = delete;
 
   absl::Status Submit(FrameRequest request, std::stop_token stop, Done done) override;
   [[nodiscard]] const DeviceInfo& device() const override { return device_; }
