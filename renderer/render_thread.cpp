@@ -1,5 +1,10 @@
 #include "renderer/render_thread.h"
 
+#include <condition_variable>
+#include <deque>
+#include <future>
+#include <mutex>
+#include <thread>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -7,20 +12,49 @@
 
 namespace halflight {
 
-absl::StatusOr<std::unique_ptr<RenderThread>> RenderThread::Start(
-    const RenderThreadOptions& options) {
-  std::unique_ptr<RenderThread> self(new RenderThread(options.max_queued_frames));
-  self->thread_ =
-      std::thread([thread = self.get(), device = options.device] { thread->Run(device); });
-  std::unique_lock lock(self->mutex_);
-  self->changed_.wait(lock, [&] { return self->started_; });
-  if (!self->start_status_.ok()) {
-    absl::Status status = self->start_status_;
-    lock.unlock();
-    return status;
-  }
-  lock.unlock();
-  return self;
+namespace {
+
+class RenderThread : public FrameEngine {
+ public:
+  explicit RenderThread(int max_queued_frames) : max_queued_frames_(max_queued_frames) {}
+  ~RenderThread() override;
+  RenderThread(const RenderThread&) = delete;
+  RenderThread& operator=(const RenderThread&) = delete;
+
+  // Call once; the engine serves when it returned OK.
+  absl::Status Start(const std::string& device);
+
+  absl::Status Submit(FrameRequest request, std::stop_token stop, Done done) override;
+  [[nodiscard]] const DeviceInfo& device() const override { return device_; }
+
+ private:
+  struct Job {
+    FrameRequest request;
+    std::stop_token stop;
+    Done done;
+  };
+
+  void Run(const std::string& device, std::promise<absl::StatusOr<DeviceInfo>> started);
+  // Waits for a job; false when stopping and none is left.
+  bool NextJob(Job& job);
+
+  const int max_queued_frames_;
+  DeviceInfo device_;
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::deque<Job> jobs_;   // guarded by mutex_
+  int unfinished_ = 0;     // guarded by mutex_: waiting or rendering
+  bool stopping_ = false;  // guarded by mutex_
+  std::thread thread_;
+};
+
+absl::Status RenderThread::Start(const std::string& device) {
+  std::promise<absl::StatusOr<DeviceInfo>> promise;
+  std::future<absl::StatusOr<DeviceInfo>> started = promise.get_future();
+  thread_ = std::thread(&RenderThread::Run, this, device, std::move(promise));
+  absl::StatusOr<DeviceInfo> info = started.get();
+  if (info.ok()) device_ = *std::move(info);
+  return info.status();
 }
 
 RenderThread::~RenderThread() {
@@ -56,16 +90,14 @@ bool RenderThread::NextJob(Job& job) {
   return true;
 }
 
-void RenderThread::Run(const std::string& device) {
+void RenderThread::Run(const std::string& device,
+                       std::promise<absl::StatusOr<DeviceInfo>> started) {
   absl::StatusOr<std::unique_ptr<FrameRenderer>> renderer = FrameRenderer::Create(device);
-  {
-    const std::lock_guard lock(mutex_);
-    start_status_ = renderer.status();
-    if (renderer.ok()) device_ = (*renderer)->device();
-    started_ = true;
+  if (!renderer.ok()) {
+    started.set_value(renderer.status());
+    return;
   }
-  changed_.notify_all();
-  if (!renderer.ok()) return;
+  started.set_value((*renderer)->device());
 
   for (Job job; NextJob(job); job = {}) {
     absl::StatusOr<FrameResult> frame = job.stop.stop_requested()
@@ -77,6 +109,14 @@ void RenderThread::Run(const std::string& device) {
     }
     job.done(std::move(frame));
   }
+}
+
+}  // namespace
+
+absl::StatusOr<std::unique_ptr<FrameEngine>> StartRenderThread(const RenderThreadOptions& options) {
+  auto engine = std::make_unique<RenderThread>(options.max_queued_frames);
+  if (absl::Status started = engine->Start(options.device); !started.ok()) return started;
+  return engine;
 }
 
 }  // namespace halflight

@@ -53,9 +53,9 @@ int Fail(int code, const absl::Status& status) {
 }
 
 int Run(const Options& options, const sigset_t& signals) {
-  auto engine = RenderThread::Start(
-      {.device = options.device,
-       .max_queued_frames = static_cast<int>(options.limits.max_queued_frames)});
+  auto engine =
+      StartRenderThread({.device = options.device,
+                         .max_queued_frames = static_cast<int>(options.limits.max_queued_frames)});
   if (!engine.ok()) {
     return Fail(kExitCannotStart, engine.status());
   }

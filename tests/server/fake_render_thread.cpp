@@ -1,5 +1,5 @@
-// RenderThread for a halflightd without GL, under the real one's name. Frames wait for as long as
-// the file that --device names is there.
+// StartRenderThread for a halflightd without GL, under the real one's name. Frames wait for as long
+// as the file that --device names is there.
 
 #include "renderer/render_thread.h"
 
@@ -14,7 +14,7 @@
 namespace halflight {
 namespace {
 
-class FakeRenderThread : public RenderThread {
+class FakeRenderThread : public FrameEngine {
  public:
   explicit FakeRenderThread(std::string hold) : hold_(std::move(hold)) {}
 
@@ -36,8 +36,7 @@ class FakeRenderThread : public RenderThread {
 
 }  // namespace
 
-absl::StatusOr<std::unique_ptr<RenderThread>> RenderThread::Start(
-    const RenderThreadOptions& options) {
+absl::StatusOr<std::unique_ptr<FrameEngine>> StartRenderThread(const RenderThreadOptions& options) {
   if (options.device == "missing") {
     return absl::NotFoundError("--device: missing, allowed: what is there");
   }
