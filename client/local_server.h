@@ -14,7 +14,7 @@ namespace halflight::client {
 struct LocalServerOptions {
   std::string executable;  // empty: halflightd beside the running program, or else in PATH
   std::string device;      // halflightd --device; empty: its own choice
-  std::string log_level = "warning";
+  std::string log_level = "warn";
   std::chrono::milliseconds start_timeout{30000};
   std::stop_token stop;  // ends the wait for the server with CANCELLED
 };
