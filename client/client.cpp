@@ -7,6 +7,7 @@
 
 #include "client/client_impl.h"
 #include "client/readers/text.h"
+#include "client/status_text.h"
 #include "halflight/sha256.h"
 
 namespace halflight::client {
@@ -20,9 +21,8 @@ constexpr int kMaxReceivedBytes = 64 << 20;
 absl::Status CheckAddress(const std::string& address) {
   const bool is_unix = address.rfind("unix:", 0) == 0;
   const size_t colon = address.rfind(':');
-  const auto port = colon == std::string::npos
-                        ? std::nullopt
-                        : ParseCount(std::string_view(address).substr(colon + 1));
+  const auto port =
+      colon == std::string::npos ? std::nullopt : ParseCount(address.substr(colon + 1));
   const bool is_tcp = !is_unix && colon != 0 && port && *port >= 1 && *port <= 65535;
   if (is_tcp || (is_unix && address.size() > 5)) {
     return absl::OkStatus();
@@ -61,8 +61,9 @@ Client::Impl::Impl(const std::string& address, ClientOptions options)
   arguments.SetInt(GRPC_ARG_ENABLE_HTTP_PROXY, 0);
   // The channel must not wait longer to connect again than the retries here wait.
   arguments.SetInt(GRPC_ARG_INITIAL_RECONNECT_BACKOFF_MS, 50);
-  arguments.SetInt(GRPC_ARG_MIN_RECONNECT_BACKOFF_MS, 50);
   arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, 1000);
+  // Despite its name, how long one attempt to connect may take.
+  arguments.SetInt(GRPC_ARG_MIN_RECONNECT_BACKOFF_MS, 10000);
   arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
   stub_ = v1::RenderService::NewStub(
       grpc::CreateCustomChannel(address, grpc::InsecureChannelCredentials(), arguments));
@@ -94,7 +95,7 @@ absl::Status Client::Impl::Try(std::string_view route, const std::stop_token& st
     if (tries >= options_.max_attempts || (has_deadline && Clock::now() + wait > deadline)) {
       return absl::Status(status.code(),
                           fmt::format("{}, after {} of {} tries: {}", address_, tries,
-                                      options_.max_attempts, std::string(status.message())));
+                                      options_.max_attempts, MessageOf(status)));
     }
     if (!SleepUnlessStopped(wait, stop)) {
       return absl::CancelledError("interrupted");

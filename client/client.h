@@ -53,6 +53,8 @@ class Client {
   // `address` is host:port or unix:path; InvalidArgument for anything else. Does not wait for the
   // server: the first call does.
   static absl::StatusOr<Client> Connect(const std::string& address, ClientOptions options = {});
+  Client(const Client&) = delete;
+  Client& operator=(const Client&) = delete;
   Client(Client&&) noexcept;
   Client& operator=(Client&&) noexcept;
   ~Client();

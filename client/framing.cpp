@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <limits>
 #include <numbers>
 
@@ -156,7 +157,8 @@ double EstimateRadius(const Particles& particles) {
   for (size_t i = 0; i < picks; ++i) {
     distances.push_back(DistanceToNth(particles, i * count / picks, neighbour));
   }
-  std::nth_element(distances.begin(), distances.begin() + picks / 2, distances.end());
+  std::nth_element(distances.begin(), distances.begin() + static_cast<std::ptrdiff_t>(picks / 2),
+                   distances.end());
   const double median = distances[picks / 2];
   if (median > 0) {
     // Of few particles a nearer neighbour is taken: spacing grows with the cube root of its rank.

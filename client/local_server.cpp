@@ -20,6 +20,7 @@
 
 #include "client/client.h"
 #include "client/retry.h"
+#include "client/status_text.h"
 
 namespace halflight::client {
 
@@ -111,6 +112,7 @@ class LocalServer::Process {
       words.insert(words.end(), {"--device", options.device});
     }
     std::vector<char*> arguments;
+    arguments.reserve(words.size() + 1);
     for (std::string& word : words) {
       arguments.push_back(word.data());
     }
@@ -243,7 +245,7 @@ absl::StatusOr<LocalServer> LocalServer::Start(const LocalServerOptions& options
     }
     if (std::chrono::steady_clock::now() > deadline) {
       reason = fmt::format("did not answer within {} ms: {}", options.start_timeout.count(),
-                           std::string(status.message()));
+                           MessageOf(status));
       break;
     }
   }

@@ -26,6 +26,8 @@ class LocalServer {
   // none is left behind by a program that was killed. NotFound where there is no executable;
   // Unavailable, with the last lines of the server's log, where it ends or does not answer in time.
   static absl::StatusOr<LocalServer> Start(const LocalServerOptions& options = {});
+  LocalServer(const LocalServer&) = delete;
+  LocalServer& operator=(const LocalServer&) = delete;
   LocalServer(LocalServer&&) noexcept;
   LocalServer& operator=(LocalServer&&) noexcept;
   // Lets the server finish what it runs, for 5 s at most, and removes its socket.

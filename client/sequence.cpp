@@ -11,6 +11,7 @@
 
 #include "client/client_impl.h"
 #include "client/readers/text.h"
+#include "client/status_text.h"
 
 namespace halflight::client {
 
@@ -269,7 +270,7 @@ absl::Status Client::Impl::RenderSequence(uint64_t count, const FrameSource& sou
     }
     if (++tries > options_.max_attempts) {
       return absl::Status(status.code(), fmt::format("{}, after {} tries: {}", address_, tries - 1,
-                                                     std::string(status.message())));
+                                                     MessageOf(status)));
     }
     if (!SleepUnlessStopped(backoff.Next(stream.retry_hint()), options_.stop)) {
       return absl::CancelledError("interrupted");

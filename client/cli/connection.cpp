@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "client/cli/exit_code.h"
+#include "client/status_text.h"
 
 namespace halflight::client {
 
@@ -15,14 +16,14 @@ Connection::Connection(std::optional<LocalServer> server, Client client)
 absl::StatusOr<Connection> Connection::Open(const ConnectionOptions& options,
                                             const std::stop_token& stop) {
   ClientOptions client_options;
-  client_options.timeout = std::chrono::milliseconds(std::llround(options.timeout_s * 1000));
+  client_options.timeout = std::chrono::milliseconds{std::llround(options.timeout_s * 1000)};
   client_options.stop = stop;
   if (!options.server.empty()) {
     auto client = Client::Connect(options.server, client_options);
     if (!client.ok()) {
-      return WithExitCode(absl::InvalidArgumentError(
-                              fmt::format("--server: {}", std::string(client.status().message()))),
-                          ExitCode::kUsage);
+      return WithExitCode(
+          absl::InvalidArgumentError(fmt::format("--server: {}", MessageOf(client.status()))),
+          ExitCode::kUsage);
     }
     return Connection(std::nullopt, *std::move(client));
   }

@@ -22,7 +22,7 @@ absl::Status WithExitCode(absl::Status status, ExitCode code) {
 
 ExitCode ExitCodeOf(const absl::Status& status) {
   if (const auto payload = status.GetPayload(kPayload)) {
-    return static_cast<ExitCode>(std::atoi(std::string(*payload).c_str()));
+    return static_cast<ExitCode>(std::atoi(static_cast<std::string>(*payload).c_str()));
   }
   switch (status.code()) {
     case absl::StatusCode::kOk:

@@ -3,9 +3,8 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
-#include <cmath>
-#include <utility>
 
+#include "client/cli/add_flag.h"
 #include "client/cli/flag_values.h"
 #include "client/readers/reader.h"
 #include "client/readers/text.h"
@@ -13,119 +12,6 @@
 namespace halflight::client {
 
 namespace {
-
-// Unwraps a parsed value, or tells CLI11 what is wrong with the flag.
-template <typename T>
-T ValueOr(const std::string& flag, absl::StatusOr<T> value) {
-  if (!value.ok()) {
-    throw CLI::ValidationError(flag, std::string(value.status().message()));
-  }
-  return *std::move(value);
-}
-
-// A flag with one value that `parse` reads into `target`.
-template <typename Target, typename T>
-CLI::Option* Add(CLI::App& app, const std::string& flag, Target& target,
-                 absl::StatusOr<T> (*parse)(std::string_view), const std::string& help,
-                 const std::string& type) {
-  return app
-      .add_option_function<std::string>(
-          flag,
-          [&target, parse, flag](const std::string& text) { target = ValueOr(flag, parse(text)); },
-          help)
-      ->type_name(type);
-}
-
-// A repeatable flag, each time with one value.
-template <typename T>
-CLI::Option* AddEach(CLI::App& app, const std::string& flag, std::vector<T>& target,
-                     absl::StatusOr<T> (*parse)(std::string_view), const std::string& help,
-                     const std::string& type) {
-  return app
-      .add_option_function<std::vector<std::string>>(
-          flag,
-          [&target, parse, flag](const std::vector<std::string>& texts) {
-            for (const std::string& text : texts) {
-              target.push_back(ValueOr(flag, parse(text)));
-            }
-          },
-          help)
-      ->type_name(type)
-      ->allow_extra_args(false);
-}
-
-// The numbers that a flag takes.
-struct Range {
-  double low;
-  double high;
-  const char* in_words;
-  bool low_included = true;
-  bool high_included = true;
-};
-constexpr Range kPositive{0, HUGE_VAL, "a number > 0", false, false};
-constexpr Range kNotNegative{0, HUGE_VAL, "a number >= 0", true, false};
-
-CLI::Option* AddNumber(CLI::App& app, const std::string& flag, std::optional<double>& target,
-                       const Range& range, const std::string& help) {
-  return app
-      .add_option_function<std::string>(
-          flag,
-          [&target, range, flag](const std::string& text) {
-            const auto value = ParseNumber(text);
-            const bool fits =
-                value && (*value > range.low || (range.low_included && *value == range.low)) &&
-                (*value < range.high || (range.high_included && *value == range.high));
-            if (!fits) {
-              throw CLI::ValidationError(flag,
-                                         fmt::format("is '{}'; allowed: {}", text, range.in_words));
-            }
-            target = value;
-          },
-          help)
-      ->type_name("NUMBER");
-}
-
-CLI::Option* AddCount(CLI::App& app, const std::string& flag, std::optional<uint32_t>& target,
-                      uint32_t low, uint32_t high, const std::string& help) {
-  return app
-      .add_option_function<std::string>(
-          flag,
-          [&target, low, high, flag](const std::string& text) {
-            const auto value = ParseCount(text);
-            if (!value || *value < low || *value > high) {
-              throw CLI::ValidationError(flag, fmt::format("is '{}'; allowed: a whole number from "
-                                                           "{} to {}",
-                                                           text, low, high));
-            }
-            target = static_cast<uint32_t>(*value);
-          },
-          help)
-      ->type_name("COUNT");
-}
-
-template <typename T>
-CLI::Option* AddChoice(CLI::App& app, const std::string& flag, std::optional<T>& target,
-                       const std::vector<std::pair<std::string, T>>& choices,
-                       const std::string& help) {
-  std::string names;
-  for (const auto& [name, value] : choices) {
-    names += fmt::format("{}{}", names.empty() ? "" : "|", name);
-  }
-  return app
-      .add_option_function<std::string>(
-          flag,
-          [&target, choices, flag, names](const std::string& text) {
-            for (const auto& [name, value] : choices) {
-              if (text == name) {
-                target = value;
-                return;
-              }
-            }
-            throw CLI::ValidationError(flag, fmt::format("is '{}'; allowed: {}", text, names));
-          },
-          help)
-      ->type_name(names);
-}
 
 void AddConnectionFlags(CLI::App& app, ConnectionOptions& options) {
   auto* const server =
@@ -306,7 +192,7 @@ void AddRenderFlags(CLI::App& app, RenderOptions& options) {
   AddConnectionFlags(app, options.connection);
   app.add_option("--request-id", options.request_id, "Names the request in the server's log")
       ->type_name("ID");
-  app.add_flag("--json", options.json, "Report on stdout as JSON, one line a frame");
+  app.add_flag("--json", options.json, "Report on stdout as JSON, one line a frame; errors too");
   app.add_flag("-q,--quiet", options.quiet, "Say nothing but errors");
 }
 

@@ -28,7 +28,8 @@ InterruptWatch::InterruptWatch() {
 
 InterruptWatch::~InterruptWatch() {
   over_ = true;
-  pthread_kill(thread_.native_handle(), SIGTERM);  // wakes the thread, and no other
+  // Wakes the thread that waits, which is the only one to get it.
+  pthread_kill(thread_.native_handle(), SIGHUP);
   thread_.join();
 }
 

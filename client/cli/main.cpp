@@ -10,7 +10,9 @@
 #include "client/cli/flags.h"
 #include "client/cli/info_command.h"
 #include "client/cli/interrupt.h"
+#include "client/cli/json.h"
 #include "client/cli/render_command.h"
+#include "client/status_text.h"
 
 namespace halflight::client {
 
@@ -42,8 +44,15 @@ ExitCode Run(int argc, char** argv) {
   const InterruptWatch interrupt;
   const absl::Status status = render->parsed() ? RunRender(render_options, interrupt.stop())
                                                : RunInfo(info_options, interrupt.stop());
+  const bool json = render_options.json || info_options.json;
+  if (!status.ok() && json) {
+    JsonObject error;
+    error.Add("error", MessageOf(status));
+    error.AddNumber("exit_code", static_cast<int>(ExitCodeOf(status)));
+    fmt::print("{}\n", error.Text());
+  }
   if (!status.ok()) {
-    fmt::print(stderr, "halflight: {}\n", std::string(status.message()));
+    fmt::print(stderr, "halflight: {}\n", MessageOf(status));
   }
   return ExitCodeOf(status);
 }

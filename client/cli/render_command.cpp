@@ -13,7 +13,7 @@
 #include "client/cli/progress.h"
 #include "client/cli/render_job.h"
 #include "client/cli/report.h"
-#include "client/cli/request_builder.h"
+#include "client/cli/request_json.h"
 
 namespace halflight::client {
 
@@ -81,11 +81,14 @@ absl::Status RenderFrames(const RenderOptions& options, const RenderJob& job, Cl
                           FrameTaker& taker) {
   auto source = [&](uint64_t index) -> absl::StatusOr<SequenceFrame> {
     const JobFrame& job_frame = job.frames[index];
-    auto particles = ReadInput(options, job_frame.input);
-    if (!particles.ok()) {
+    SequenceFrame frame{job.request, std::nullopt};
+    if (index == 0 && job.first_particles) {
+      frame.particles = EncodeParticles(*job.first_particles);
+    } else if (const auto particles = ReadInput(options, job_frame.input); particles.ok()) {
+      frame.particles = EncodeParticles(*particles);
+    } else {
       return particles.status();
     }
-    SequenceFrame frame{job.request, EncodeParticles(*particles)};
     if (!job.request.request_id().empty()) {
       frame.request.set_request_id(
           fmt::format("{}.{}", job.request.request_id(), *job_frame.number));

@@ -13,7 +13,9 @@
 #include "client/cli/exit_code.h"
 #include "client/cli/frame_pattern.h"
 #include "client/cli/request_builder.h"
+#include "client/cli/request_json.h"
 #include "client/readers/reader.h"
+#include "client/status_text.h"
 
 namespace halflight::client {
 
@@ -35,8 +37,7 @@ absl::StatusOr<v1::RenderFrameRequest> BuildRequest(const RenderOptions& options
     }
     auto parsed = ParseRequestJson(json.str());
     if (!parsed.ok()) {
-      return Usage(fmt::format("--scene: {}: {}", options.scene_path,
-                               std::string(parsed.status().message())));
+      return Usage(fmt::format("--scene: {}: {}", options.scene_path, MessageOf(parsed.status())));
     }
     request = *std::move(parsed);
   }
@@ -61,11 +62,11 @@ absl::Status CheckNames(const RenderOptions& options, const v1::RenderFrameReque
     return absl::OkStatus();
   }
   if (const absl::Status status = CheckPattern(options.input); !status.ok()) {
-    return Usage(fmt::format("input: {}", std::string(status.message())));
+    return Usage(fmt::format("input: {}", MessageOf(status)));
   }
   for (const OutputFlag& output : options.outputs) {
     if (const absl::Status status = CheckPattern(output.path); !status.ok()) {
-      return Usage(fmt::format("--output: {}", std::string(status.message())));
+      return Usage(fmt::format("--output: {}", MessageOf(status)));
     }
   }
   return absl::OkStatus();

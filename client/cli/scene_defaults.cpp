@@ -31,21 +31,20 @@ bool AllHave(const std::vector<const Particles*>& clouds, std::vector<float> Par
 // The radius of particles that have none of their own.
 double ChooseRadius(const std::vector<const Particles*>& clouds, v1::Scene& scene,
                     std::vector<Choice>& choices) {
+  const auto filled = std::find_if(clouds.begin(), clouds.end(),
+                                   [](const Particles* cloud) { return cloud->size() > 0; });
+  if (filled != clouds.end() && AllHave(clouds, &Particles::radii)) {
+    const auto [low, high] = std::minmax_element((*filled)->radii.begin(), (*filled)->radii.end());
+    choices.push_back({"radius", fmt::format("{:.6g} to {:.6g}, from the file", *low, *high)});
+    return 1;
+  }
   if (scene.material().has_radius()) {
     choices.push_back({"radius", fmt::format("{:.6g}, as given", scene.material().radius())});
     return scene.material().radius();
   }
-  const bool in_files = AllHave(clouds, &Particles::radii);
-  const auto filled = std::find_if(clouds.begin(), clouds.end(),
-                                   [](const Particles* cloud) { return cloud->size() > 0; });
   if (filled == clouds.end()) {
     scene.mutable_material()->set_radius(1);
     choices.push_back({"radius", "1, since there are no particles"});
-    return 1;
-  }
-  if (in_files) {
-    const auto [low, high] = std::minmax_element((*filled)->radii.begin(), (*filled)->radii.end());
-    choices.push_back({"radius", fmt::format("{:.6g} to {:.6g}, from the file", *low, *high)});
     return 1;
   }
   const double radius = EstimateRadius(**filled);
@@ -57,10 +56,10 @@ double ChooseRadius(const std::vector<const Particles*>& clouds, v1::Scene& scen
 
 void ChooseOpacity(const std::vector<const Particles*>& clouds, v1::Scene& scene,
                    std::vector<Choice>& choices) {
-  if (scene.material().has_opacity()) {
-    choices.push_back({"opacity", fmt::format("{:.6g}, as given", scene.material().opacity())});
-  } else if (!clouds.empty() && !clouds[0]->opacities.empty()) {
+  if (!clouds[0]->opacities.empty()) {
     choices.push_back({"opacity", "from the file"});
+  } else if (scene.material().has_opacity()) {
+    choices.push_back({"opacity", fmt::format("{:.6g}, as given", scene.material().opacity())});
   } else {
     scene.mutable_material()->set_opacity(kDefaultOpacity);
     choices.push_back({"opacity", fmt::format("{:.6g}, the default", kDefaultOpacity)});

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "client/readers/text.h"
+#include "client/status_text.h"
 
 namespace halflight::client {
 
@@ -86,7 +87,7 @@ absl::StatusOr<Columns> ReadCsv(std::string_view bytes) {
   }
   const auto columns = MatchColumns(names);
   if (!columns.ok()) {
-    return LineError(lines, std::string(columns.status().message()));
+    return LineError(lines, MessageOf(columns.status()));
   }
 
   Columns values;

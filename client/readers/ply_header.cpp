@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "client/readers/text.h"
+#include "client/status_text.h"
 
 namespace halflight::client {
 
@@ -143,8 +144,8 @@ absl::StatusOr<PlyHeader> ParsePlyHeader(std::string_view bytes) {
                       Excerpt(keyword)));
     }
     if (!status.ok()) {
-      return absl::Status(status.code(), fmt::format("line {}: {}", lines.line_number(),
-                                                     std::string(status.message())));
+      return absl::Status(status.code(),
+                          fmt::format("line {}: {}", lines.line_number(), MessageOf(status)));
     }
     if (keyword == "end_header") {
       return header;

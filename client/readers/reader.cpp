@@ -17,6 +17,7 @@
 #include "client/readers/npy.h"
 #include "client/readers/ply.h"
 #include "client/readers/raw.h"
+#include "client/status_text.h"
 
 namespace halflight::client {
 
@@ -77,7 +78,7 @@ absl::StatusOr<std::string> ReadBytes(const std::string& path) {
 }
 
 absl::Status InFile(const std::string& path, const absl::Status& status) {
-  return absl::Status(status.code(), fmt::format("{}: {}", path, std::string(status.message())));
+  return absl::Status(status.code(), fmt::format("{}: {}", path, MessageOf(status)));
 }
 
 }  // namespace

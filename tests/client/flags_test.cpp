@@ -8,6 +8,8 @@
 #include "client/cli/flag_values.h"
 #include "client/cli/frame_pattern.h"
 #include "client/cli/request_builder.h"
+#include "client/cli/request_json.h"
+#include "client/status_text.h"
 #include "tests/client/test_bytes.h"
 
 namespace halflight::client {
@@ -44,7 +46,7 @@ std::string ErrorOf(const std::vector<std::string>& words) {
   std::string error = Parse(words, options);
   if (error.empty()) {
     v1::RenderFrameRequest request;
-    error = std::string(ApplyFlags(options, request).message());
+    error = MessageOf(ApplyFlags(options, request));
   }
   return error;
 }

@@ -53,7 +53,7 @@ TEST_F(LocalServerTest, GivesUpOnAServerThatNeverAnswersAndEndsIt) {
   // "--address unix:DIRECTORY/socket ...": the directory is gone with the server.
   const std::string arguments = Read("arguments");
   EXPECT_THAT(arguments, testing::StartsWith("--address unix:/"));
-  EXPECT_THAT(arguments, testing::EndsWith("/socket --log-level warning --device gpu0"));
+  EXPECT_THAT(arguments, testing::EndsWith("/socket --log-level warn --device gpu0"));
   const size_t start = arguments.find('/');
   EXPECT_FALSE(fs::exists(arguments.substr(start, arguments.find("/socket") - start)));
 }

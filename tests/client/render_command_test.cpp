@@ -11,7 +11,8 @@
 #include "client/cli/file_writer.h"
 #include "client/cli/progress.h"
 #include "client/cli/render_job.h"
-#include "client/cli/request_builder.h"
+#include "client/cli/request_json.h"
+#include "client/status_text.h"
 #include "tests/client/fake_service.h"
 #include "tests/client/test_bytes.h"
 
@@ -88,8 +89,8 @@ TEST_F(RenderCommandTest, AsksForNothingWhileAFrameIsMissing) {
   Output("f.%d.png");
   const absl::Status status = Run();
   EXPECT_EQ(ExitCodeOf(status), ExitCode::kInput);
-  EXPECT_THAT(std::string(status.message()), HasSubstr("a.2.csv"));
-  EXPECT_THAT(std::string(status.message()), HasSubstr("1 of 3"));
+  EXPECT_THAT(MessageOf(status), HasSubstr("a.2.csv"));
+  EXPECT_THAT(MessageOf(status), HasSubstr("1 of 3"));
   EXPECT_EQ(service_.Calls("FindMissingParticles") + service_.Calls("RenderSequence"), 0);
   EXPECT_EQ(Files(), 2U);
 }
@@ -99,7 +100,7 @@ TEST_F(RenderCommandTest, UploadsNothingOfAMalformedFile) {
   Output("a.png");
   const absl::Status status = Run();
   EXPECT_EQ(ExitCodeOf(status), ExitCode::kInput);
-  EXPECT_THAT(std::string(status.message()), HasSubstr("line 2"));
+  EXPECT_THAT(MessageOf(status), HasSubstr("line 2"));
   EXPECT_EQ(service_.Calls("UploadParticles"), 0);
 }
 
@@ -112,7 +113,7 @@ TEST_F(RenderCommandTest, EndsASequenceAtAMalformedFileAndKeepsTheFramesBefore) 
   Output("f.%d.png");
   const absl::Status status = Run();
   EXPECT_EQ(ExitCodeOf(status), ExitCode::kInput);
-  EXPECT_THAT(std::string(status.message()), HasSubstr("a.3.csv: line 2"));
+  EXPECT_THAT(MessageOf(status), HasSubstr("a.3.csv: line 2"));
   EXPECT_TRUE(fs::exists(directory_ / "f.2.png"));
   EXPECT_FALSE(fs::exists(directory_ / "f.3.png"));
 }
@@ -130,8 +131,8 @@ TEST_F(RenderCommandTest, NamesTheFileOfAFrameThatTheServerRefused) {
   Output("f.%d.png");
   const absl::Status status = Run();
   EXPECT_EQ(ExitCodeOf(status), ExitCode::kRefused);
-  EXPECT_THAT(std::string(status.message()), HasSubstr("1 of 2 frames done"));
-  EXPECT_THAT(std::string(status.message()), HasSubstr("a.11.csv: bad radius"));
+  EXPECT_THAT(MessageOf(status), HasSubstr("1 of 2 frames done"));
+  EXPECT_THAT(MessageOf(status), HasSubstr("a.11.csv: bad radius"));
 }
 
 TEST_F(RenderCommandTest, TellsCausesApartByExitCode) {
@@ -265,7 +266,7 @@ TEST(WriteFileWhole, ReplacesAFileAndLeavesNothingBeside) {
   EXPECT_EQ(std::distance(fs::directory_iterator(directory / "."), {}), 1);
   EXPECT_TRUE(WriteFileWhole("/dev/null", "x").ok());
   EXPECT_FALSE(fs::is_regular_file("/dev/null"));
-  EXPECT_THAT(std::string(WriteFileWhole(directory / "none/a", "x").message()),
+  EXPECT_THAT(MessageOf(WriteFileWhole(directory / "none/a", "x")),
               HasSubstr("none/a"));
 }
 

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "absl/status/status.h"
+#include "client/status_text.h"
 
 namespace halflight::client {
 
@@ -53,7 +54,7 @@ inline void ExpectError(const absl::Status& status, absl::StatusCode code,
                         const std::vector<std::string>& texts) {
   EXPECT_EQ(status.code(), code) << status;
   for (const std::string& text : texts) {
-    EXPECT_THAT(std::string(status.message()), testing::HasSubstr(text));
+    EXPECT_THAT(MessageOf(status), testing::HasSubstr(text));
   }
 }
 
