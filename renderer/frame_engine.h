@@ -24,10 +24,11 @@ class FrameEngine {
 
   virtual ~FrameEngine() = default;
 
-  // Queues a frame. When it returns OK, `done` is called exactly once, on the engine's thread, in
-  // the order of submission: with the frame, with an error, or with Cancelled soon after `stop` was
-  // requested. Otherwise `done` is never called: ResourceExhausted when the queue is full,
-  // Unavailable when the engine is shutting down. Any thread.
+  // Queues a frame. Its timings begin with "queue", the time until it was begun. When it returns
+  // OK, `done` is called exactly once, on the engine's thread, in the order of submission: with the
+  // frame, with an error, or with Cancelled soon after `stop` was requested. Otherwise `done` is
+  // never called: ResourceExhausted when the queue is full, Unavailable when the engine is shutting
+  // down. Any thread.
   virtual absl::Status Submit(FrameRequest request, std::stop_token stop, Done done) = 0;
 
   // The same at all times. Any thread.

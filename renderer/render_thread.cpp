@@ -1,5 +1,6 @@
 #include "renderer/render_thread.h"
 
+#include <chrono>
 #include <condition_variable>
 #include <deque>
 #include <future>
@@ -13,6 +14,8 @@
 namespace halflight {
 
 namespace {
+
+using Clock = std::chrono::steady_clock;
 
 class RenderThread : public FrameEngine {
  public:
@@ -32,6 +35,7 @@ class RenderThread : public FrameEngine {
     FrameRequest request;
     std::stop_token stop;
     Done done;
+    Clock::time_point submitted;
   };
 
   void Run(const std::string& device, std::promise<absl::StatusOr<DeviceInfo>> started);
@@ -75,7 +79,7 @@ absl::Status RenderThread::Submit(FrameRequest request, std::stop_token stop, Do
           "frame queue: ", unfinished_, " frames wait, allowed: at most ", max_queued_frames_));
     }
     ++unfinished_;
-    jobs_.push_back({std::move(request), std::move(stop), std::move(done)});
+    jobs_.push_back({std::move(request), std::move(stop), std::move(done), Clock::now()});
   }
   changed_.notify_all();
   return absl::OkStatus();
@@ -100,9 +104,11 @@ void RenderThread::Run(const std::string& device,
   started.set_value((*renderer)->device());
 
   for (Job job; NextJob(job); job = {}) {
+    const std::chrono::duration<double, std::milli> waited = Clock::now() - job.submitted;
     absl::StatusOr<FrameResult> frame = job.stop.stop_requested()
                                             ? absl::CancelledError("frame cancelled")
                                             : (*renderer)->Render(job.request, job.stop);
+    if (frame.ok()) frame->timings.insert(frame->timings.begin(), {"queue", waited.count()});
     {
       const std::lock_guard lock(mutex_);
       --unfinished_;

@@ -140,13 +140,7 @@ void FramePipeline::Complete(const std::shared_ptr<Flight>& flight) {
   const auto now = Clock::now();
   std::vector<StageTiming> timings;
   if (flight->outcome.ok()) {
-    // The engine tells how long it worked; what is left of the time until then was waiting.
     timings = std::move(flight->rendered.timings);
-    double waited = Milliseconds(flight->rendered_at - flight->submitted);
-    for (const StageTiming& stage : timings) {
-      waited -= stage.milliseconds;
-    }
-    timings.insert(timings.begin(), {"queue", std::max(0.0, waited)});
     timings.push_back({"encode", Milliseconds(now - flight->rendered_at)});
   }
   timings.push_back({"total", Milliseconds(now - flight->submitted)});

@@ -11,11 +11,12 @@ namespace halflight::client {
 namespace {
 
 double ServerMilliseconds(const v1::FrameHeader& header) {
-  double sum = 0;
   for (const v1::StageTiming& timing : header.timings()) {
-    sum += timing.milliseconds();
+    if (timing.stage() == "total") {
+      return timing.milliseconds();
+    }
   }
-  return sum;
+  return 0.0;
 }
 
 std::string OutputsJson(const FrameReport& report, const RenderedFrame& frame) {
