@@ -181,6 +181,25 @@ TEST_F(ClientTest, DetectsDamagedOutputs) {
   }
 }
 
+TEST(Client, ConnectsAgainToAServerThatComesLate) {
+  const TestDirectory directory;
+  const std::string address = "unix:" + (directory / "socket");
+  ClientOptions options;
+  options.max_attempts = 100;
+  options.first_backoff = std::chrono::milliseconds(10);
+  Client client = *Client::Connect(address, options);
+  EXPECT_FALSE(client.WaitForConnection(std::chrono::milliseconds(10)));
+  std::unique_ptr<FakeService> service;
+  const std::jthread starter([&] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(200));
+    service = std::make_unique<FakeService>(address);
+  });
+  const auto start = std::chrono::steady_clock::now();
+  EXPECT_TRUE(client.GetServerInfo().ok());
+  // gRPC by itself looks after an idle channel every 5 s only.
+  EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(3));
+}
+
 TEST_F(ClientTest, EndsAtItsDeadline) {
   service_.FailNext("GetServerInfo", std::vector(1000, kUnavailable));
   ClientOptions options;

@@ -21,13 +21,14 @@ namespace halflight::client {
 
 class FakeService final : public v1::RenderService::Service {
  public:
-  FakeService() {
+  // Port 0 takes a free one.
+  explicit FakeService(const std::string& address = "127.0.0.1:0") {
     int port = 0;
     grpc::ServerBuilder builder;
-    builder.AddListeningPort("127.0.0.1:0", grpc::InsecureServerCredentials(), &port);
+    builder.AddListeningPort(address, grpc::InsecureServerCredentials(), &port);
     builder.RegisterService(this);
     server_ = builder.BuildAndStart();
-    address_ = "127.0.0.1:" + std::to_string(port);
+    address_ = port > 1 ? "127.0.0.1:" + std::to_string(port) : address;
   }
   ~FakeService() override { server_->Shutdown(std::chrono::system_clock::now()); }
   FakeService(const FakeService&) = delete;
@@ -174,7 +175,7 @@ class FakeService final : public v1::RenderService::Service {
     if (failures.empty()) {
       return grpc::Status::OK;
     }
-    const grpc::Status status = failures.front();
+    grpc::Status status = failures.front();
     failures.pop_front();
     return status;
   }
