@@ -130,18 +130,6 @@ absl::StatusOr<v1::GetServerInfoResponse> Client::Impl::GetServerInfo(const std:
   return response;
 }
 
-absl::StatusOr<v1::ServerLimits> Client::Impl::Limits(const std::stop_token& stop) {
-  const std::lock_guard lock(limits_mutex_);
-  if (!limits_) {
-    const auto info = GetServerInfo(stop);
-    if (!info.ok()) {
-      return info.status();
-    }
-    limits_ = info->limits();
-  }
-  return *limits_;
-}
-
 absl::StatusOr<std::vector<std::string>> Client::Impl::FindMissing(
     const std::vector<std::string>& sha256, std::string_view route, const std::stop_token& stop) {
   v1::FindMissingParticlesRequest request;
@@ -194,22 +182,6 @@ absl::Status Client::Impl::EnsureUploaded(const EncodedParticles& particles, std
   const auto missing = FindMissing({particles.sha256}, route, stop);
   if (!missing.ok() || missing->empty()) {
     return missing.status();
-  }
-  // The server says RESOURCE_EXHAUSTED to a set that it will never take; no retry would cure that.
-  const auto limits = Limits(stop);
-  if (!limits.ok()) {
-    return limits.status();
-  }
-  if (limits->max_particles() != 0 && particles.layout.count() > limits->max_particles()) {
-    return absl::InvalidArgumentError(fmt::format("the set has {} particles; allowed: at most {}",
-                                                  particles.layout.count(),
-                                                  limits->max_particles()));
-  }
-  if (limits->max_particle_bytes() != 0 &&
-      particles.payload.size() > limits->max_particle_bytes()) {
-    return absl::InvalidArgumentError(fmt::format("the set has {} bytes; allowed: at most {}",
-                                                  particles.payload.size(),
-                                                  limits->max_particle_bytes()));
   }
   return Upload(particles, route, stop);
 }

@@ -55,8 +55,6 @@ class Client::Impl {
   absl::Status UploadOnce(grpc::ClientContext& context, const EncodedParticles& particles);
   absl::StatusOr<RenderedFrame> RenderOnce(grpc::ClientContext& context,
                                            const v1::RenderFrameRequest& request);
-  // Limits of the server, asked for once.
-  absl::StatusOr<v1::ServerLimits> Limits(const std::stop_token& stop);
 
   std::string address_;
   ClientOptions options_;

@@ -125,18 +125,6 @@ TEST_F(ClientTest, UploadsOnlyOnceMore) {
   EXPECT_EQ(service_.Calls("UploadParticles"), 2);
 }
 
-TEST_F(ClientTest, RefusesToSendASetThatTheServerNeverTakes) {
-  service_.limits.set_max_particles(99);
-  const EncodedParticles particles = SomeParticles(1, 100);
-  ExpectError(Connect().EnsureUploaded(particles), StatusCode::kInvalidArgument,
-              {"100 particles", "at most 99"});
-  service_.limits.set_max_particles(0);
-  service_.limits.set_max_particle_bytes(1199);
-  ExpectError(Connect().EnsureUploaded(particles), StatusCode::kInvalidArgument,
-              {"1200 bytes", "at most 1199"});
-  EXPECT_EQ(service_.Calls("UploadParticles"), 0);
-}
-
 TEST_F(ClientTest, DetectsDamagedOutputs) {
   struct Case {
     const char* message;

@@ -53,7 +53,6 @@ class FakeService final : public v1::RenderService::Service {
   std::function<void(v1::RenderSequenceResponse& message)> tamper;
   // Called with each request of a sequence before it is answered.
   std::function<grpc::Status(uint64_t index)> before_frame;
-  v1::ServerLimits limits;
   int evict_after_upload = 0;       // so many sets are dropped as soon as they are complete
   std::vector<std::string> routes;  // metadata of renders, in hexadecimal
 
@@ -68,7 +67,6 @@ class FakeService final : public v1::RenderService::Service {
   grpc::Status GetServerInfo(grpc::ServerContext* /*context*/,
                              const v1::GetServerInfoRequest* /*request*/,
                              v1::GetServerInfoResponse* response) override {
-    *response->mutable_limits() = limits;
     response->set_server_version("fake");
     return Enter("GetServerInfo");
   }
