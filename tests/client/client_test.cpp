@@ -77,15 +77,13 @@ TEST_F(ClientTest, DoesNotUploadWhatTheServerHas) {
 }
 
 TEST_F(ClientTest, TriesAgainWhenTheServerIsBusy) {
-  for (const char* rpc :
-       {"GetServerInfo", "FindMissingParticles", "UploadParticles", "RenderFrame"}) {
+  for (const char* rpc : {"FindMissingParticles", "UploadParticles", "RenderFrame"}) {
     service_.FailNext(rpc, {kUnavailable, kExhausted});
   }
   const EncodedParticles particles = SomeParticles(1);
   const auto frame = Connect().RenderFrame(SomeRequest(), &particles);
   ASSERT_TRUE(frame.ok()) << frame.status();
-  for (const char* rpc :
-       {"GetServerInfo", "FindMissingParticles", "UploadParticles", "RenderFrame"}) {
+  for (const char* rpc : {"FindMissingParticles", "UploadParticles", "RenderFrame"}) {
     EXPECT_EQ(service_.Calls(rpc), 3) << rpc;
   }
 }
