@@ -149,8 +149,9 @@ absl::StatusOr<FrameResult> FrameRenderer::Render(const FrameRequest& request,
   const ParticleBuffers buffers = UploadParticles(particles);
   const double samples = static_cast<double>(scene.sampling.supersample) /
                          static_cast<double>(scene.sampling.downsample);
-  const TargetProjection eye =
-      UploadProjection(EyeProjection(scene.camera, plan->composite_size, samples), particles);
+  Projection eye_projection = EyeProjection(scene.camera, plan->composite_size, samples);
+  eye_projection.near_eye = ReachesEyePlane(eye_projection, particles);
+  const TargetProjection eye = UploadProjection(eye_projection, particles);
 
   // Walk over the particles once for each light that casts shadows, and add up the light.
   DrawnImages drawn;

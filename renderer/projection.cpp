@@ -1,6 +1,7 @@
 #include "renderer/projection.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <limits>
 
@@ -125,6 +126,19 @@ Projection EyeProjection(const Camera& camera, const glm::ivec2& target_size, do
   projection.pixel_offset = samples * glm::dvec2(0.5 * camera.width - camera.window.x,
                                                  0.5 * camera.height - camera.window.y);
   return projection;
+}
+
+bool ReachesEyePlane(const Projection& projection, const ParticleView& particles) {
+  const glm::dvec3 forward = -glm::dvec3(glm::row(projection.view_from_world, 2));
+  const double origin_depth = glm::dot(forward, particles.set().origin - projection.eye());
+  std::atomic<bool> reaches = false;
+  ParallelRanges(particles.size(), [&](const WorkRange& range) {
+    for (size_t i = range.begin; i < range.end && !reaches; ++i) {
+      const double depth = origin_depth + glm::dot(forward, glm::dvec3(particles.positions()[i]));
+      if (depth < 1.001 * particles.radius(i)) reaches = true;
+    }
+  });
+  return reaches;
 }
 
 glm::dvec3 TravelDirection(const Light& light, const ParticleView& particles) {

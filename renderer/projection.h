@@ -18,6 +18,7 @@ struct Projection {
   glm::ivec2 size{1};              // target, pixels
   glm::dvec2 pixel_from_plane{1};  // scale
   glm::dvec2 pixel_offset{0};      // pixel = plane * pixel_from_plane + pixel_offset
+  bool near_eye = false;           // particles may reach the plane through the eye
   double least_radius = 0.0;       // plane units; smaller particles are drawn as large as this
 
   // Maps world points to target coordinates: after division by w, (0, 0) is the outer corner of the
@@ -32,6 +33,10 @@ struct Projection {
 // The eye's projection onto a target that samples the camera's window with `samples` samples a
 // pixel along each side (below 1: fewer samples than pixels).
 Projection EyeProjection(const Camera& camera, const glm::ivec2& target_size, double samples);
+
+// Whether any particle reaches the plane through the projection's eye, or comes so near to it that
+// rounding may tell otherwise.
+bool ReachesEyePlane(const Projection& projection, const ParticleView& particles);
 
 // A projection from a light onto a square light buffer, fitted to the particles: shows all of each
 // of them and leaves only the border that filtering needs. `spread` widens the border by that many

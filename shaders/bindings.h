@@ -57,6 +57,10 @@ HALFLIGHT_CONSTANT(kPhaseConstant, 10);
 HALFLIGHT_CONSTANT(kDepthOutputConstant, 11);
 HALFLIGHT_CONSTANT(kTransmittanceOutputConstant, 12);
 HALFLIGHT_CONSTANT(kEnlargeConstant, 13);
+HALFLIGHT_CONSTANT(kNearEyeConstant, 14);
+HALFLIGHT_CONSTANT(kColoredDensityConstant, 15);
+HALFLIGHT_CONSTANT(kVaryingLightsConstant, 16);
+HALFLIGHT_CONSTANT(kShadowLightVariesConstant, 17);
 
 HALFLIGHT_CONSTANT(kProjectGroupSize, 64);
 HALFLIGHT_CONSTANT(kMaxLightsInTraversal, 16);
@@ -92,20 +96,21 @@ struct Splat {
   vec4 optics;  // x: optical depth at the centre; y: general, 1 where depth <= radius
 };
 
+// A light whose radiance at a particle depends on the ray or on the place.
 struct LightBlock {
-  vec4 color;     // rgb; w: 1 with inverse square falloff
-  vec4 vector;    // view axes; direction of travel (w = 0) or position (w = 1)
-  vec4 density;   // rgb shadow density
+  vec4 color;   // rgb; w: 1 with inverse square falloff
+  vec4 vector;  // view axes; direction of travel (w = 0) or position (w = 1)
 };
 
 struct CompositeBlock {
   mat4 light_view_from_view;    // rotation only; of the light that casts shadows
   vec4 light_texture_from_plane;  // xy: scale, zw: offset, to texture coordinates
   vec4 albedo;                  // rgb; w: phase g
-  vec4 ambient;                 // rgb
   vec4 emission;                // rgb
-  uvec4 light_count;            // x; the one that casts shadows, if any, is the first
-  LightBlock lights[kMaxLightsInTraversal];
+  vec4 density;                 // rgb shadow density
+  vec4 constant_light;          // rgb; unshadowed and the same everywhere, ambient included
+  vec4 constant_shadowed;       // rgb; the shadow casting light, where the same everywhere
+  LightBlock lights[kMaxLightsInTraversal];  // that vary; the one that casts shadows is the first
 };
 
 struct BlurBlock {

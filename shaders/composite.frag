@@ -16,7 +16,11 @@ layout(constant_id = kShadowedConstant) const bool kShadowed = false;
 layout(constant_id = kPointShadowLightConstant) const bool kPointShadowLight = false;
 layout(constant_id = kInterpolateConstant) const bool kInterpolate = false;
 layout(constant_id = kColoredLightBufferConstant) const bool kColoredLightBuffer = false;
+layout(constant_id = kColoredDensityConstant) const bool kColoredDensity = false;
 layout(constant_id = kPhaseConstant) const bool kPhase = false;
+layout(constant_id = kVaryingLightsConstant) const uint kVaryingLights = 0;
+// Whether the shadow casting light is the first of those that vary.
+layout(constant_id = kShadowLightVariesConstant) const bool kShadowLightVaries = false;
 layout(constant_id = kDepthOutputConstant) const bool kDepthOutput = false;
 layout(constant_id = kTransmittanceOutputConstant) const bool kTransmittanceOutput = false;
 
@@ -70,26 +74,35 @@ float PhaseFunction(vec3 light_travel, vec3 ray) {
   return (1.0 - g * g) / (d * sqrt(d));
 }
 
+// Radiance of a light that varies, at a point in view space.
+vec3 RadianceAt(LightBlock source, vec3 at, vec3 ray) {
+  vec3 travel = source.vector.w != 0.0 ? at - source.vector.xyz : source.vector.xyz;
+  vec3 radiance = source.color.rgb;
+  if (source.color.w != 0.0) radiance /= dot(travel, travel);
+  if (kPhase) radiance *= PhaseFunction(normalize(travel), normalize(ray));
+  return radiance;
+}
+
 void main() {
-  Encounter e = MeetParticle(gl_FragCoord.xy, center, optics.y != 0.0);
+  bool general = kNearEye && optics.y != 0.0;
+  Encounter e = MeetParticle(gl_FragCoord.xy, center, general);
   if (e.rho_squared >= 1.0 || !e.in_front) discard;
   float alpha = OpacityFromOpticalDepth(optics.x * ProfileWeight(e.rho_squared));
 
-  vec3 centre_in_view = kOrthographic      ? vec3(center.xy, -center.z)
-                        : optics.y != 0.0 ? center.xyz
-                                          : center.z * vec3(center.xy, -1.0);
-  vec3 at = centre_in_view + e.offset;
   vec3 shadow = vec3(1.0);
-  if (kShadowed) shadow = exp(-composite.lights[0].density.rgb * OpticalDepthOfLight(e.offset));
+  if (kShadowed) {
+    vec3 attenuation = composite.density.rgb * OpticalDepthOfLight(e.offset);
+    shadow = kColoredDensity ? exp(-attenuation) : vec3(exp(-attenuation.r));
+  }
+  vec3 light = composite.constant_light.rgb + composite.constant_shadowed.rgb * shadow;
 
-  vec3 light = composite.ambient.rgb;
-  for (uint l = 0u; l < composite.light_count.x; ++l) {
-    LightBlock source = composite.lights[l];
-    vec3 travel = source.vector.w != 0.0 ? at - source.vector.xyz : source.vector.xyz;
-    vec3 radiance = source.color.rgb;
-    if (source.color.w != 0.0) radiance /= dot(travel, travel);
-    if (kPhase) radiance *= PhaseFunction(normalize(travel), normalize(e.ray));
-    light += (kShadowed && l == 0u) ? radiance * shadow : radiance;
+  vec3 center_in_view = kOrthographic ? vec3(center.xy, -center.z)
+                        : general     ? center.xyz
+                                      : center.z * vec3(center.xy, -1.0);
+  vec3 at = center_in_view + e.offset;
+  for (uint l = 0u; l < kVaryingLights; ++l) {
+    vec3 radiance = RadianceAt(composite.lights[l], at, e.ray);
+    light += kShadowLightVaries && l == 0u ? radiance * shadow : radiance;
   }
   image = vec4((albedo.rgb * light + emission.rgb) * alpha, alpha);
   if (kDepthOutput) depth = vec4(-at.z * alpha, 0.0, 0.0, alpha);

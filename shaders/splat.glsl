@@ -3,6 +3,8 @@
 #include "opacity.glsl"
 
 layout(constant_id = kOrthographicConstant) const bool kOrthographic = false;
+// Whether particles reach the plane through the eye, so that the general encounter is met.
+layout(constant_id = kNearEyeConstant) const bool kNearEye = false;
 layout(constant_id = kBallProfileConstant) const bool kBallProfile = false;
 
 layout(std140, binding = kProjectionBinding) uniform Projections { ProjectionBlock projection; };
@@ -34,7 +36,7 @@ Encounter MeetParticle(vec2 pixel, vec4 center, bool general) {
   }
   e.ray = vec3(plane, -1.0);
   vec3 moment = center.z * vec3(delta.y, -delta.x, center.x * delta.y - center.y * delta.x);
-  if (general) {
+  if (kNearEye && general) {
     moment = cross(center.xyz, e.ray);
     e.in_front = dot(center.xyz, e.ray) > 0.0;
   }

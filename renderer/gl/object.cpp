@@ -32,9 +32,8 @@ GLuint CreateTexture(const TextureInfo& info) {
   GLuint name = 0;
   glCreateTextures(GL_TEXTURE_2D, 1, &name);
   glTextureStorage2D(name, 1, info.format, info.width, info.height);
-  const GLint wrap = info.clamp_to_zero ? GL_CLAMP_TO_BORDER : GL_CLAMP_TO_EDGE;
-  glTextureParameteri(name, GL_TEXTURE_WRAP_S, wrap);
-  glTextureParameteri(name, GL_TEXTURE_WRAP_T, wrap);
+  glTextureParameteri(name, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE);
+  glTextureParameteri(name, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);
   glTextureParameteri(name, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
   glTextureParameteri(name, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
   glObjectLabel(GL_TEXTURE, name, -1, info.label);

@@ -85,10 +85,9 @@ struct TextureInfo {
   GLenum format = GL_RGBA32F;  // glTextureStorage2D
   int width = 1;
   int height = 1;
-  bool clamp_to_zero = false;  // GL_TEXTURE_WRAP_*: border of zeros instead of the edge
 };
 
-// A bilinearly filtered 2D texture without mipmaps, which knows its size.
+// A bilinearly filtered 2D texture without mipmaps, clamped to its edge, which knows its size.
 class Texture : public Object<TextureTraits> {
  public:
   Texture() = default;

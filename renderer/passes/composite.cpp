@@ -23,7 +23,6 @@ const gl::ProgramSource& CompositeProgram() {
 shader::LightBlock DescribeLight(const Light& light, const glm::dmat4& view_from_world) {
   shader::LightBlock block;
   block.color = glm::vec4(light.color, 0.0F);
-  block.density = glm::vec4(light.shadow_density, 0.0F);
   if (const auto* directional = std::get_if<DirectionalLight>(&light.kind)) {
     block.vector = glm::vec4(glm::dmat3(view_from_world) * directional->direction, 0.0F);
   } else {
@@ -34,16 +33,55 @@ shader::LightBlock DescribeLight(const Light& light, const glm::dmat4& view_from
   return block;
 }
 
+// Whether the light's radiance, shadows aside, depends on the ray or on the place.
+bool Varies(const Light& light, const Material& material) {
+  const auto* point = std::get_if<PointLight>(&light.kind);
+  return material.phase_g != 0.0F || (point != nullptr && point->inverse_square_falloff);
+}
+
+// The lights of a traversal, as the shader wants them: what is the same everywhere summed up.
+struct TraversalLights {
+  glm::vec3 constant{0.0F};
+  glm::vec3 constant_shadowed{0.0F};
+  std::vector<const Light*> varying;  // the one that casts shadows first
+  bool shadow_light_varies = false;
+};
+
+TraversalLights SortLights(const Scene& scene, const Traversal& traversal) {
+  TraversalLights lights;
+  if (traversal.ambient_and_emission) lights.constant = scene.material.ambient;
+  if (traversal.shadow_light) {
+    const Light& light = scene.lights[static_cast<size_t>(*traversal.shadow_light)];
+    lights.shadow_light_varies = Varies(light, scene.material);
+    if (lights.shadow_light_varies) {
+      lights.varying.push_back(&light);
+    } else {
+      lights.constant_shadowed = light.color;
+    }
+  }
+  for (const int index : traversal.unshadowed_lights) {
+    const Light& light = scene.lights[static_cast<size_t>(index)];
+    if (Varies(light, scene.material)) {
+      lights.varying.push_back(&light);
+    } else {
+      lights.constant += light.color;
+    }
+  }
+  return lights;
+}
+
 shader::CompositeBlock DescribeComposite(const Scene& scene, const Traversal& traversal,
-                                         const Projection& eye, const Projection* light) {
+                                         const TraversalLights& lights, const Projection& eye,
+                                         const Projection* light) {
   const Material& material = scene.material;
   shader::CompositeBlock block{};
   block.albedo = glm::vec4(material.albedo, material.phase_g);
-  if (traversal.ambient_and_emission) {
-    block.ambient = glm::vec4(material.ambient, 0.0F);
-    block.emission = glm::vec4(material.emission, 0.0F);
-  }
+  if (traversal.ambient_and_emission) block.emission = glm::vec4(material.emission, 0.0F);
+  block.constant_light = glm::vec4(lights.constant, 0.0F);
+  block.constant_shadowed = glm::vec4(lights.constant_shadowed, 0.0F);
   if (light != nullptr) {
+    const Light& source = scene.lights[static_cast<size_t>(*traversal.shadow_light)];
+    block.density = glm::vec4(source.shadow_density, 0.0F);
     const glm::dmat3 rotation =
         glm::dmat3(light->view_from_world) * glm::transpose(glm::dmat3(eye.view_from_world));
     block.light_view_from_view = glm::mat4(glm::mat3(rotation));
@@ -51,12 +89,8 @@ shader::CompositeBlock DescribeComposite(const Scene& scene, const Traversal& tr
     block.light_texture_from_plane =
         glm::vec4(light->pixel_from_plane / size, light->pixel_offset / size);
   }
-  std::vector<int> lights = traversal.unshadowed_lights;
-  if (traversal.shadow_light) lights.insert(lights.begin(), *traversal.shadow_light);
-  for (size_t i = 0; i < lights.size() && i < shader::kMaxLightsInTraversal; ++i) {
-    block.lights[i] =
-        DescribeLight(scene.lights[static_cast<size_t>(lights[i])], eye.view_from_world);
-    block.light_count.x = static_cast<uint32_t>(i) + 1;
+  for (size_t i = 0; i < lights.varying.size(); ++i) {
+    block.lights[i] = DescribeLight(*lights.varying[i], eye.view_from_world);
   }
   return block;
 }
@@ -85,6 +119,10 @@ CompositePass PrepareComposite(const Scene& scene, const Traversal& traversal,
                                const TargetProjection* light, const gl::Buffer* light_splats,
                                const CompositeTarget& target) {
   const bool point_light = light != nullptr && !light->projection.orthographic;
+  const bool colored_density =
+      light != nullptr &&
+      scene.lights[static_cast<size_t>(*traversal.shadow_light)].colored_density();
+  const TraversalLights lights = SortLights(scene, traversal);
   return {
       .order = order,
       .particles = particles,
@@ -92,7 +130,7 @@ CompositePass PrepareComposite(const Scene& scene, const Traversal& traversal,
       .eye_splats = eye_splats,
       .light_splats = light_splats,
       .uniforms = gl::MakeBlock("composite",
-                                DescribeComposite(scene, traversal, eye.projection,
+                                DescribeComposite(scene, traversal, lights, eye.projection,
                                                   light != nullptr ? &light->projection : nullptr)),
       .constants =
           {
@@ -106,6 +144,10 @@ CompositePass PrepareComposite(const Scene& scene, const Traversal& traversal,
               {shader::kPointShadowLightConstant, point_light},
               {shader::kInterpolateConstant, traversal.interpolate},
               {shader::kColoredLightBufferConstant, traversal.colored_light_buffer},
+              {shader::kColoredDensityConstant, colored_density},
+              {shader::kVaryingLightsConstant, static_cast<uint32_t>(lights.varying.size())},
+              {shader::kShadowLightVariesConstant, lights.shadow_light_varies},
+              {shader::kNearEyeConstant, eye.projection.near_eye},
               {shader::kPhaseConstant, scene.material.phase_g != 0.0F},
               {shader::kDepthOutputConstant, static_cast<bool>(target.depth)},
               {shader::kTransmittanceOutputConstant, static_cast<bool>(target.transmittance)},

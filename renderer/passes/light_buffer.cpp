@@ -83,8 +83,7 @@ LightBuffer MakeLightBuffer(const char* label, int size, bool colored) {
   buffer.texture = gl::Texture({.label = label,
                                 .format = static_cast<GLenum>(colored ? GL_RGBA32F : GL_R32F),
                                 .width = size,
-                                .height = size,
-                                .clamp_to_zero = true});
+                                .height = size});
   buffer.framebuffer = gl::MakeFramebuffer(label, {&buffer.texture});
   constexpr std::array<float, 4> kZero = {};
   glClearNamedFramebufferfv(buffer.framebuffer.name(), GL_COLOR, 0, kZero.data());
