@@ -61,12 +61,28 @@ Client::Impl::Impl(const std::string& address, ClientOptions options)
   arguments.SetInt(GRPC_ARG_ENABLE_HTTP_PROXY, 0);
   // The channel must not wait longer to connect again than the retries here wait.
   arguments.SetInt(GRPC_ARG_INITIAL_RECONNECT_BACKOFF_MS, 50);
-  arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, 1000);
+  arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, 250);
   // Despite its name, how long one attempt to connect may take.
   arguments.SetInt(GRPC_ARG_MIN_RECONNECT_BACKOFF_MS, 10000);
   arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
-  stub_ = v1::RenderService::NewStub(
-      grpc::CreateCustomChannel(address, grpc::InsecureChannelCredentials(), arguments));
+  channel_ = grpc::CreateCustomChannel(address, grpc::InsecureChannelCredentials(), arguments);
+  stub_ = v1::RenderService::NewStub(channel_);
+}
+
+bool Client::Impl::WaitForConnection(std::chrono::milliseconds time, const std::stop_token& stop) {
+  constexpr std::chrono::milliseconds kLookForStop{50};
+  const auto end = Clock::now() + time;
+  bool connected = false;
+  do {
+    connected = channel_->WaitForConnected(std::min(end, Clock::now() + kLookForStop));
+  } while (!connected && Clock::now() < end && !stop.stop_requested());
+  return connected;
+}
+
+bool Client::Impl::Pause(std::chrono::milliseconds time, const std::stop_token& stop) {
+  const auto end = Clock::now() + time;
+  WaitForConnection(time, stop);
+  return SleepUnlessStopped(std::chrono::ceil<std::chrono::milliseconds>(end - Clock::now()), stop);
 }
 
 absl::Status Client::Impl::Try(std::string_view route, const std::stop_token& stop,
@@ -97,7 +113,7 @@ absl::Status Client::Impl::Try(std::string_view route, const std::stop_token& st
                           fmt::format("{}, after {} of {} tries: {}", address_, tries,
                                       options_.max_attempts, MessageOf(status)));
     }
-    if (!SleepUnlessStopped(wait, stop)) {
+    if (!Pause(wait, stop)) {
       return absl::CancelledError("interrupted");
     }
   }
@@ -112,18 +128,6 @@ absl::StatusOr<v1::GetServerInfoResponse> Client::Impl::GetServerInfo(const std:
     return status;
   }
   return response;
-}
-
-absl::StatusOr<v1::ServerLimits> Client::Impl::Limits(const std::stop_token& stop) {
-  const std::lock_guard lock(limits_mutex_);
-  if (!limits_) {
-    const auto info = GetServerInfo(stop);
-    if (!info.ok()) {
-      return info.status();
-    }
-    limits_ = info->limits();
-  }
-  return *limits_;
 }
 
 absl::StatusOr<std::vector<std::string>> Client::Impl::FindMissing(
@@ -178,22 +182,6 @@ absl::Status Client::Impl::EnsureUploaded(const EncodedParticles& particles, std
   const auto missing = FindMissing({particles.sha256}, route, stop);
   if (!missing.ok() || missing->empty()) {
     return missing.status();
-  }
-  // The server says RESOURCE_EXHAUSTED to a set that it will never take; no retry would cure that.
-  const auto limits = Limits(stop);
-  if (!limits.ok()) {
-    return limits.status();
-  }
-  if (limits->max_particles() != 0 && particles.layout.count() > limits->max_particles()) {
-    return absl::InvalidArgumentError(fmt::format("the set has {} particles; allowed: at most {}",
-                                                  particles.layout.count(),
-                                                  limits->max_particles()));
-  }
-  if (limits->max_particle_bytes() != 0 &&
-      particles.payload.size() > limits->max_particle_bytes()) {
-    return absl::InvalidArgumentError(fmt::format("the set has {} bytes; allowed: at most {}",
-                                                  particles.payload.size(),
-                                                  limits->max_particle_bytes()));
   }
   return Upload(particles, route, stop);
 }
@@ -259,6 +247,10 @@ absl::StatusOr<Client> Client::Connect(const std::string& address, ClientOptions
     return status;
   }
   return Client(std::make_unique<Impl>(address, std::move(options)));
+}
+
+bool Client::WaitForConnection(std::chrono::milliseconds time) {
+  return impl_->WaitForConnection(time, impl_->options().stop);
 }
 
 absl::StatusOr<v1::GetServerInfoResponse> Client::GetServerInfo() {

@@ -59,6 +59,9 @@ class Client {
   Client& operator=(Client&&) noexcept;
   ~Client();
 
+  // Waits for a connection, `time` at most; false where there is none by then.
+  bool WaitForConnection(std::chrono::milliseconds time);
+
   absl::StatusOr<v1::GetServerInfoResponse> GetServerInfo();
 
   // Those of the named sets that the server lacks.

@@ -25,6 +25,8 @@ class Client::Impl {
  public:
   Impl(const std::string& address, ClientOptions options);
 
+  bool WaitForConnection(std::chrono::milliseconds time, const std::stop_token& stop);
+
   // Each does what the method of Client does, ending early when `stop` is requested. `route` is the
   // particle set by which a proxy may choose a server, so that a frame goes where its particles
   // went; empty: none.
@@ -47,14 +49,16 @@ class Client::Impl {
   // used up.
   absl::Status Try(std::string_view route, const std::stop_token& stop,
                    const std::function<absl::Status(grpc::ClientContext&)>& attempt);
+  // Waits between tries; false when `stop` was requested. A connection that is lost comes up again
+  // only while somebody waits on its channel: calls on it fail at once, and nothing else drives it.
+  bool Pause(std::chrono::milliseconds time, const std::stop_token& stop);
   absl::Status UploadOnce(grpc::ClientContext& context, const EncodedParticles& particles);
   absl::StatusOr<RenderedFrame> RenderOnce(grpc::ClientContext& context,
                                            const v1::RenderFrameRequest& request);
-  // Limits of the server, asked for once.
-  absl::StatusOr<v1::ServerLimits> Limits(const std::stop_token& stop);
 
   std::string address_;
   ClientOptions options_;
+  std::shared_ptr<grpc::Channel> channel_;
   std::unique_ptr<v1::RenderService::Stub> stub_;
   std::mutex limits_mutex_;
   std::optional<v1::ServerLimits> limits_;

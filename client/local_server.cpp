@@ -19,7 +19,6 @@
 #include <vector>
 
 #include "client/client.h"
-#include "client/retry.h"
 #include "client/status_text.h"
 
 namespace halflight::client {
@@ -236,11 +235,14 @@ absl::StatusOr<LocalServer> LocalServer::Start(const LocalServerOptions& options
   const auto deadline = std::chrono::steady_clock::now() + options.start_timeout;
   std::string reason;
   while (process->IsRunning()) {
-    const absl::Status status = client->GetServerInfo().status();
+    absl::Status status = absl::UnavailableError("it does not listen");
+    if (client->WaitForConnection(milliseconds(50))) {
+      status = client->GetServerInfo().status();
+    }
     if (status.ok()) {
       return LocalServer(std::move(process));
     }
-    if (!SleepUnlessStopped(milliseconds(20), options.stop)) {
+    if (options.stop.stop_requested()) {
       return absl::CancelledError("interrupted");
     }
     if (std::chrono::steady_clock::now() > deadline) {

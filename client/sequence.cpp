@@ -272,7 +272,7 @@ absl::Status Client::Impl::RenderSequence(uint64_t count, const FrameSource& sou
       return absl::Status(status.code(), fmt::format("{}, after {} tries: {}", address_, tries - 1,
                                                      MessageOf(status)));
     }
-    if (!SleepUnlessStopped(backoff.Next(stream.retry_hint()), options_.stop)) {
+    if (!Pause(backoff.Next(stream.retry_hint()), options_.stop)) {
       return absl::CancelledError("interrupted");
     }
   }

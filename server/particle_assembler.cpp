@@ -82,11 +82,11 @@ absl::StatusOr<uint64_t> CheckedPayloadBytes(const v1::ParticleLayout& layout,
   }
   const std::optional<uint64_t> bytes = PayloadBytes(layout);
   if (layout.count() > limits.max_particles) {
-    return absl::ResourceExhaustedError(fmt::format("{}.count: {}, allowed: at most {} particles",
+    return absl::InvalidArgumentError(fmt::format("{}.count: {}, allowed: at most {} particles",
                                                     field, layout.count(), limits.max_particles));
   }
   if (!bytes.has_value() || *bytes > limits.max_particle_bytes) {
-    return absl::ResourceExhaustedError(
+    return absl::InvalidArgumentError(
         fmt::format("{}.count: {} particles of these attributes take {} bytes, allowed: at most {}",
                     field, layout.count(), bytes.value_or(UINT64_MAX), limits.max_particle_bytes));
   }

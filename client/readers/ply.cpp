@@ -96,7 +96,7 @@ class BinaryBody {
       const PlyProperty& property = element.properties[i];
       const ScalarType type = property.is_list ? property.count_type : property.type;
       if (!Has(SizeOf(type))) {
-        return Truncated(element, index, property, SizeOf(type));
+        return Truncated(element, index, property, static_cast<double>(SizeOf(type)));
       }
       const double value = LoadScalar(bytes_.data() + offset_, type, order_);
       offset_ += SizeOf(type);

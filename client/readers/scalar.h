@@ -33,9 +33,9 @@ constexpr size_t SizeOf(ScalarType type) {
     case ScalarType::kFloat32:
       return 4;
     case ScalarType::kFloat64:
-      return 8;
+      break;
   }
-  return 0;
+  return 8;
 }
 
 template <typename T>

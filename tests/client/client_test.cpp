@@ -77,15 +77,13 @@ TEST_F(ClientTest, DoesNotUploadWhatTheServerHas) {
 }
 
 TEST_F(ClientTest, TriesAgainWhenTheServerIsBusy) {
-  for (const char* rpc :
-       {"GetServerInfo", "FindMissingParticles", "UploadParticles", "RenderFrame"}) {
+  for (const char* rpc : {"FindMissingParticles", "UploadParticles", "RenderFrame"}) {
     service_.FailNext(rpc, {kUnavailable, kExhausted});
   }
   const EncodedParticles particles = SomeParticles(1);
   const auto frame = Connect().RenderFrame(SomeRequest(), &particles);
   ASSERT_TRUE(frame.ok()) << frame.status();
-  for (const char* rpc :
-       {"GetServerInfo", "FindMissingParticles", "UploadParticles", "RenderFrame"}) {
+  for (const char* rpc : {"FindMissingParticles", "UploadParticles", "RenderFrame"}) {
     EXPECT_EQ(service_.Calls(rpc), 3) << rpc;
   }
 }
@@ -123,18 +121,6 @@ TEST_F(ClientTest, UploadsOnlyOnceMore) {
   ExpectError(Connect().RenderFrame(SomeRequest(), &particles).status(), StatusCode::kNotFound,
               {"particle_sha256"});
   EXPECT_EQ(service_.Calls("UploadParticles"), 2);
-}
-
-TEST_F(ClientTest, RefusesToSendASetThatTheServerNeverTakes) {
-  service_.limits.set_max_particles(99);
-  const EncodedParticles particles = SomeParticles(1, 100);
-  ExpectError(Connect().EnsureUploaded(particles), StatusCode::kInvalidArgument,
-              {"100 particles", "at most 99"});
-  service_.limits.set_max_particles(0);
-  service_.limits.set_max_particle_bytes(1199);
-  ExpectError(Connect().EnsureUploaded(particles), StatusCode::kInvalidArgument,
-              {"1200 bytes", "at most 1199"});
-  EXPECT_EQ(service_.Calls("UploadParticles"), 0);
 }
 
 TEST_F(ClientTest, DetectsDamagedOutputs) {
@@ -179,6 +165,25 @@ TEST_F(ClientTest, DetectsDamagedOutputs) {
     ExpectError(client.RenderFrame(SomeRequest(), &particles).status(), StatusCode::kDataLoss,
                 {damage.message});
   }
+}
+
+TEST(Client, ConnectsAgainToAServerThatComesLate) {
+  const TestDirectory directory;
+  const std::string address = "unix:" + (directory / "socket");
+  ClientOptions options;
+  options.max_attempts = 100;
+  options.first_backoff = std::chrono::milliseconds(10);
+  Client client = *Client::Connect(address, options);
+  EXPECT_FALSE(client.WaitForConnection(std::chrono::milliseconds(10)));
+  std::unique_ptr<FakeService> service;
+  const std::jthread starter([&] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(200));
+    service = std::make_unique<FakeService>(address);
+  });
+  const auto start = std::chrono::steady_clock::now();
+  EXPECT_TRUE(client.GetServerInfo().ok());
+  // gRPC by itself looks after an idle channel every 5 s only.
+  EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(3));
 }
 
 TEST_F(ClientTest, EndsAtItsDeadline) {

@@ -21,13 +21,14 @@ namespace halflight::client {
 
 class FakeService final : public v1::RenderService::Service {
  public:
-  FakeService() {
+  // Port 0 takes a free one.
+  explicit FakeService(const std::string& address = "127.0.0.1:0") {
     int port = 0;
     grpc::ServerBuilder builder;
-    builder.AddListeningPort("127.0.0.1:0", grpc::InsecureServerCredentials(), &port);
+    builder.AddListeningPort(address, grpc::InsecureServerCredentials(), &port);
     builder.RegisterService(this);
     server_ = builder.BuildAndStart();
-    address_ = "127.0.0.1:" + std::to_string(port);
+    address_ = port > 1 ? "127.0.0.1:" + std::to_string(port) : address;
   }
   ~FakeService() override { server_->Shutdown(std::chrono::system_clock::now()); }
   FakeService(const FakeService&) = delete;
@@ -52,7 +53,6 @@ class FakeService final : public v1::RenderService::Service {
   std::function<void(v1::RenderSequenceResponse& message)> tamper;
   // Called with each request of a sequence before it is answered.
   std::function<grpc::Status(uint64_t index)> before_frame;
-  v1::ServerLimits limits;
   int evict_after_upload = 0;       // so many sets are dropped as soon as they are complete
   std::vector<std::string> routes;  // metadata of renders, in hexadecimal
 
@@ -67,7 +67,6 @@ class FakeService final : public v1::RenderService::Service {
   grpc::Status GetServerInfo(grpc::ServerContext* /*context*/,
                              const v1::GetServerInfoRequest* /*request*/,
                              v1::GetServerInfoResponse* response) override {
-    *response->mutable_limits() = limits;
     response->set_server_version("fake");
     return Enter("GetServerInfo");
   }
@@ -174,7 +173,7 @@ class FakeService final : public v1::RenderService::Service {
     if (failures.empty()) {
       return grpc::Status::OK;
     }
-    const grpc::Status status = failures.front();
+    grpc::Status status = failures.front();
     failures.pop_front();
     return status;
   }

@@ -15,7 +15,6 @@ namespace {
 using absl::StatusCode;
 using testing::Each;
 using testing::ElementsAre;
-using testing::HasSubstr;
 
 TEST(ReadParticles, ReadsTheWholePlume) {
   const auto particles = ReadParticles(HALFLIGHT_TEST_DATA "/plume/plume.0040.ply");

@@ -266,8 +266,7 @@ TEST(WriteFileWhole, ReplacesAFileAndLeavesNothingBeside) {
   EXPECT_EQ(std::distance(fs::directory_iterator(directory / "."), {}), 1);
   EXPECT_TRUE(WriteFileWhole("/dev/null", "x").ok());
   EXPECT_FALSE(fs::is_regular_file("/dev/null"));
-  EXPECT_THAT(MessageOf(WriteFileWhole(directory / "none/a", "x")),
-              HasSubstr("none/a"));
+  EXPECT_THAT(MessageOf(WriteFileWhole(directory / "none/a", "x")), HasSubstr("none/a"));
 }
 
 TEST(ProgressLine, ShowsFramesSpeedAndTimeLeft) {

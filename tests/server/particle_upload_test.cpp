@@ -190,11 +190,11 @@ TEST_F(Upload, CountOverTheLimitsIsRefusedBeforeAnyBody) {
   v1::ParticleSetDescription header = header_;
   header.mutable_layout()->set_count(UINT64_MAX);
   const absl::Status status = Send({Header(header)});
-  EXPECT_EQ(status.code(), absl::StatusCode::kResourceExhausted);
+  EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument);
   EXPECT_THAT(std::string(status.message()),
               HasSubstr("header.layout.count: 18446744073709551615"));
   limits_.max_particle_bytes = 3199;
-  EXPECT_EQ(Send({Header(header_)}).code(), absl::StatusCode::kResourceExhausted);
+  EXPECT_EQ(Send({Header(header_)}).code(), absl::StatusCode::kInvalidArgument);
 }
 
 TEST_F(Upload, AllUploadsTogetherStayWithinTheirMemory) {

@@ -429,7 +429,7 @@ TEST(Validation, TooManyParticlesAreRefusedForGood) {
   ServerLimits limits;
   limits.max_particles = 1;
   const auto job = ConvertRequest(request, store, limits);
-  EXPECT_EQ(job.status().code(), absl::StatusCode::kResourceExhausted);
+  EXPECT_EQ(job.status().code(), absl::StatusCode::kInvalidArgument);
 }
 
 }  // namespace
