@@ -118,7 +118,7 @@ TEST(Outputs, EachShowsTheCloudWhereItIs) {
   EXPECT_EQ(value(2, 0, 0, kWidth), INFINITY);
   EXPECT_LT(value(3, kWidth / 2, kHeight / 2, kWidth), 0.95);
   EXPECT_EQ(value(3, 0, 0, kWidth), 1.0);
-  EXPECT_LT(value(4, kTexels / 2, kTexels / 2, kTexels), 0.5);
+  EXPECT_LT(value(4, kTexels / 2, kTexels / 2, kTexels), 0.8);
 
   // Light only ever gets less, and what is left at last is the light buffer.
   const auto layers = FloatsOf(frame.outputs[5]);
