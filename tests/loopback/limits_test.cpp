@@ -71,6 +71,7 @@ TEST(Limits, FullQueueRefusesOneFrameAndKeepsTheOthers) {
   std::atomic<int> refused = 0;
   {
     std::vector<std::jthread> callers;
+    callers.reserve(3);
     const RendererHeld held;
     for (int i = 0; i < 3; ++i) {
       callers.emplace_back([&] {
@@ -100,6 +101,7 @@ TEST(Limits, ClientThatTriesAgainGetsItsFrameOutOfAFullQueue) {
   std::atomic<int> done = 0;
   {
     std::vector<std::jthread> callers;
+    callers.reserve(4);
     const RendererHeld held;
     for (int i = 0; i < 4; ++i) {
       callers.emplace_back([&] { done += client.RenderFrame(request).ok() ? 1 : 0; });

@@ -107,8 +107,8 @@ TEST(Outputs, EachShowsTheCloudWhereItIs) {
     *request.add_outputs() = OutputOf(kind);
   }
   const client::RenderedFrame frame = MustRender(client, request);
-  const auto value = [&](size_t output, int x, int y, int width) {
-    return FloatsOf(frame.outputs[output]).at(static_cast<size_t>(y * width + x));
+  const auto value = [&](size_t output, size_t x, size_t y, size_t width) {
+    return FloatsOf(frame.outputs[output]).at(y * width + x);
   };
   EXPECT_GT(value(1, kWidth / 2, kHeight / 2, kWidth), 0.5);
   EXPECT_EQ(value(1, 0, 0, kWidth), 0.0);

@@ -40,6 +40,7 @@ Process::Process(const Folder& folder, const std::string& program,
   log_ = folder / ("log." + std::to_string(logs++));
   arguments.insert(arguments.begin(), std::string(HALFLIGHT_BINARY_DIR) + "/" + program);
   std::vector<char*> argv;
+  argv.reserve(arguments.size() + 1);
   for (std::string& argument : arguments) {
     argv.push_back(argument.data());
   }

@@ -39,8 +39,10 @@ TEST(Window, CropIsThatPartOfTheWholeImage) {
     const client::RenderedFrame frame = MustRender(client, request);
     std::vector<float> expected;
     for (int y = window.y; y < window.y + window.height; ++y) {
-      const auto row = whole.begin() + (y * kWidth + window.x) * 4;
-      expected.insert(expected.end(), row, row + window.width * 4);
+      const float* const row = whole.data() + static_cast<size_t>(y) * kWidth * 4;
+      const size_t first = static_cast<size_t>(window.x) * 4;
+      const size_t count = static_cast<size_t>(window.width) * 4;
+      expected.insert(expected.end(), row + first, row + first + count);
     }
     EXPECT_LT(MaxDifference(FloatsOf(frame.outputs[0]), expected), 1e-5);
     EXPECT_EQ(frame.header.outputs(0).width(), static_cast<uint32_t>(window.width));
@@ -62,12 +64,10 @@ TEST(Window, SupersamplingAveragesALargerImage) {
   const auto averaged = PixelsOf(client, scene);
   ASSERT_EQ(averaged.size(), kWidth * kHeight * 4U);
   std::vector<float> expected;
-  const auto at = [&](int x, int y, int c) {
-    return large[static_cast<size_t>((y * kWidth * 2 + x) * 4 + c)];
-  };
-  for (int y = 0; y < kHeight; ++y) {
-    for (int x = 0; x < kWidth; ++x) {
-      for (int c = 0; c < 4; ++c) {
+  const auto at = [&](size_t x, size_t y, size_t c) { return large[(y * kWidth * 2 + x) * 4 + c]; };
+  for (size_t y = 0; y < kHeight; ++y) {
+    for (size_t x = 0; x < kWidth; ++x) {
+      for (size_t c = 0; c < 4; ++c) {
         expected.push_back(0.25F * (at(2 * x, 2 * y, c) + at(2 * x + 1, 2 * y, c) +
                                     at(2 * x, 2 * y + 1, c) + at(2 * x + 1, 2 * y + 1, c)));
       }
