@@ -46,10 +46,17 @@ void AddFlags(CLI::App& app, Options& options) {
   const auto number = [&app](const std::string& flag, auto& value, const std::string& help) {
     app.add_option(flag, value, help)->capture_default_str()->group("Limits");
   };
-  const auto bytes = [&app](const std::string& flag, uint64_t& value, const std::string& help) {
+  // The conversion of sizes takes -1 for the largest number there is.
+  const CLI::Validator not_negative(
+      [](const std::string& text) {
+        return text.find('-') == std::string::npos ? "" : text + ", allowed: a size from 0 on";
+      },
+      "");
+  const auto bytes = [&](const std::string& flag, uint64_t& value, const std::string& help) {
     app.add_option(flag, value, help + "; takes suffixes such as 64MiB")
         ->capture_default_str()
         ->transform(CLI::AsSizeValue(false))
+        ->transform(not_negative)  // the last one added looks first
         ->group("Limits");
   };
   number("--max-particles", limits.max_particles, "Particles of one set");

@@ -75,6 +75,7 @@ TEST(Options, ErrorsNameFlagValueAndWhatIsAllowed) {
   EXPECT_THAT(ErrorOf({"--max-queued-frames", "-3"}), HasSubstr("--max-queued-frames"));
   EXPECT_THAT(ErrorOf({"--max-cache-bytes", "1MiB", "--max-particle-bytes", "2MiB"}),
               HasSubstr("--max-cache-bytes: 1048576, allowed: at least --max-particle-bytes"));
+  EXPECT_THAT(ErrorOf({"--max-cache-bytes", "-1"}), HasSubstr("--max-cache-bytes: -1, allowed: "));
   EXPECT_THAT(ErrorOf({"--drain-seconds", "-1"}), HasSubstr("--drain-seconds"));
   EXPECT_THAT(ErrorOf({"--no-such-flag"}), HasSubstr("--no-such-flag"));
   EXPECT_THAT(ErrorOf({"stray"}), HasSubstr("stray"));
