@@ -121,8 +121,10 @@ int main(int argc, char** argv) {
   ExitCode code = ExitCode::kFailed;
   try {
     code = halflight::client::Run(argc, argv);
-    if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0) {
+    if (std::fflush(stdout) != 0) {
       code = halflight::client::StdoutFailed(std::strerror(errno));
+    } else if (std::ferror(stdout) != 0) {
+      code = halflight::client::StdoutFailed("it was full or closed while frames were reported");
     }
   } catch (const std::exception& error) {
     if (std::ferror(stdout) != 0) {
