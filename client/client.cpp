@@ -104,6 +104,12 @@ absl::Status Client::Impl::Try(std::string_view route, const std::stop_token& st
     if (stop.stop_requested() && !status.ok()) {
       return absl::CancelledError("interrupted");
     }
+    if (status.code() == absl::StatusCode::kDeadlineExceeded && has_deadline) {
+      return absl::DeadlineExceededError(
+          fmt::format("timeout: {} s went by without an answer from {}; allowed: longer, or 0 for "
+                      "no limit",
+                      std::chrono::duration<double>(options_.timeout).count(), address_));
+    }
     if (!IsRetryable(status)) {
       return status;
     }

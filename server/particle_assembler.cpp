@@ -24,14 +24,14 @@ const AttributeFormat* FindFormat(int attribute) {
 Interval AllowedValues(v1::ParticleAttribute attribute) {
   switch (attribute) {
     case v1::PARTICLE_ATTRIBUTE_RADIUS:
-      return kPositive;
+      return kRadius;
     case v1::PARTICLE_ATTRIBUTE_OPACITY:
       return {.low = 0.0, .high = 1.0};
     case v1::PARTICLE_ATTRIBUTE_COLOR:
     case v1::PARTICLE_ATTRIBUTE_EMISSION:
       return kNotNegative;
     default:
-      return kFinite;
+      return kOffset;
   }
 }
 
@@ -83,7 +83,7 @@ absl::StatusOr<uint64_t> CheckedPayloadBytes(const v1::ParticleLayout& layout,
   const std::optional<uint64_t> bytes = PayloadBytes(layout);
   if (layout.count() > limits.max_particles) {
     return absl::InvalidArgumentError(fmt::format("{}.count: {}, allowed: at most {} particles",
-                                                    field, layout.count(), limits.max_particles));
+                                                  field, layout.count(), limits.max_particles));
   }
   if (!bytes.has_value() || *bytes > limits.max_particle_bytes) {
     return absl::InvalidArgumentError(

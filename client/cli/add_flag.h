@@ -14,8 +14,10 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
+#include "client/cli/flag_values.h"
 #include "client/readers/text.h"
 #include "client/status_text.h"
+#include "halflight/particle_payload.h"
 
 namespace halflight::client {
 
@@ -68,7 +70,9 @@ struct Range {
   bool high_included = true;
 };
 inline constexpr Range kPositive{0, HUGE_VAL, "a number > 0", false, false};
-inline constexpr Range kNotNegative{0, HUGE_VAL, "a number >= 0", true, false};
+// Of fields that are 32-bit floats in the request.
+inline constexpr Range kNotNegative{0, kLargestFloat, "a number from 0 to 3e38"};
+inline constexpr Range kRadius{kSmallestRadius, kLargestLength, "a number from 1e-15 to 1e17"};
 
 inline CLI::Option* AddNumber(CLI::App& app, const std::string& flag, std::optional<double>& target,
                               const Range& range, const std::string& help) {

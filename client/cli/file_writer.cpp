@@ -55,6 +55,13 @@ absl::Status PrepareDirectoryOf(const std::string& path) {
   if (fs::is_directory(path, error)) {
     return Failed(path, "written", "it is a directory");
   }
+  // Files are made beside their name and moved there; devices and pipes are written to directly.
+  const bool in_place = fs::exists(path, error) && !fs::is_regular_file(path, error);
+  const std::string target =
+      in_place ? path : (directory.empty() ? fs::path(".") : directory).string();
+  if (access(target.c_str(), W_OK) != 0) {
+    return Failed(path, "written", std::strerror(errno));
+  }
   return absl::OkStatus();
 }
 

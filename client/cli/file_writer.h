@@ -8,7 +8,8 @@
 
 namespace halflight::client {
 
-// Creates the directory that `path` lies in, so that a frame is not rendered in vain.
+// Creates the directory that `path` lies in and asks whether it may be written to, so that a frame
+// is not rendered in vain.
 absl::Status PrepareDirectoryOf(const std::string& path);
 
 // Writes a temporary file beside `path` and renames it, so that nobody sees half a file; what is no

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <set>
@@ -82,8 +83,9 @@ absl::StatusOr<Vec3> ParseColor(std::string_view text) {
   if (numbers.size() == 1) {
     numbers.resize(3, numbers[0]);
   }
-  if (numbers.size() != 3 || numbers[0] < 0 || numbers[1] < 0 || numbers[2] < 0) {
-    return Unexpected(text, "one number or three r,g,b, each >= 0");
+  const auto fits = [](double number) { return number >= 0 && number <= kLargestFloat; };
+  if (numbers.size() != 3 || !std::all_of(numbers.begin(), numbers.end(), fits)) {
+    return Unexpected(text, "one number or three r,g,b, each from 0 to 3e38");
   }
   return Vec3{numbers[0], numbers[1], numbers[2]};
 }

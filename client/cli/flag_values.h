@@ -12,6 +12,9 @@
 
 namespace halflight::client {
 
+// What colours and other 32-bit floats of a request may be: in decimal, below the largest float.
+inline constexpr double kLargestFloat = 3e38;
+
 // "1,-2.5,3": finite numbers.
 absl::StatusOr<Vec3> ParseVector(std::string_view text);
 // "0.5" or "0.5,0.6,0.7": finite and >= 0.

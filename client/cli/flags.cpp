@@ -129,7 +129,7 @@ void AddLightFlags(CLI::App& app, RenderOptions& options) {
 }
 
 void AddMaterialFlags(CLI::App& app, RenderOptions& options) {
-  AddNumber(app, "--radius", options.radius, kPositive,
+  AddNumber(app, "--radius", options.radius, kRadius,
             "Radius of every particle, world units, also where the file has radii; default: the "
             "file's, or estimated from the spacing");
   AddNumber(app, "--opacity", options.opacity, {0, 1, "a number from 0 to 1"},

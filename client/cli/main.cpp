@@ -1,10 +1,19 @@
 // halflight, the command-line client: flags, one command, an exit code.
 // What each command does is in its own pair of files.
+#include <fcntl.h>
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cerrno>
+#include <csignal>
+#include <cstdio>
+#include <cstring>
 #include <exception>
 #include <string>
+#include <string_view>
+#include <vector>
 
 #include "client/cli/exit_code.h"
 #include "client/cli/flags.h"
@@ -17,6 +26,35 @@
 namespace halflight::client {
 
 namespace {
+
+// What is wrong with the command line, as CLI11 found it; names what it only counts.
+std::string UsageMessage(const CLI::App& app, const CLI::ParseError& error) {
+  const std::vector<std::string> extras = app.remaining(true);
+  if (extras.empty()) {
+    return error.what();
+  }
+  if (app.get_subcommands().empty()) {
+    return fmt::format("command: is '{}'; allowed: render, info", extras.front());
+  }
+  for (const std::string& word : extras) {
+    if (word[0] == '-') {
+      return fmt::format("{}: is no flag of this command; allowed: those that --help lists", word);
+    }
+  }
+  return fmt::format("input: '{}' is one too many; allowed: one file, or a pattern with --frames",
+                     extras.front());
+}
+
+ExitCode Fail(ExitCode code, const std::string& message, bool json) {
+  if (json) {
+    JsonObject error;
+    error.Add("error", message);
+    error.AddNumber("exit_code", static_cast<int>(code));
+    fmt::print("{}\n", error.Text());
+  }
+  fmt::print(stderr, "halflight: {}\n", message);
+  return code;
+}
 
 ExitCode Run(int argc, char** argv) {
   CLI::App app("Renders particle clouds with shadows, through a halflight server.", "halflight");
@@ -38,23 +76,37 @@ ExitCode Run(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? ExitCode::kOk : ExitCode::kUsage;  // 0: --help, --version
+    if (error.get_exit_code() == 0) {  // --help, --version
+      app.exit(error);
+      return ExitCode::kOk;
+    }
+    // The flag may stand behind the mistake.
+    const bool json = std::find(argv, argv + argc, std::string_view("--json")) != argv + argc;
+    return Fail(ExitCode::kUsage, UsageMessage(app, error), json);
   }
 
   const InterruptWatch interrupt;
   const absl::Status status = render->parsed() ? RunRender(render_options, interrupt.stop())
                                                : RunInfo(info_options, interrupt.stop());
-  const bool json = render_options.json || info_options.json;
-  if (!status.ok() && json) {
-    JsonObject error;
-    error.Add("error", MessageOf(status));
-    error.AddNumber("exit_code", static_cast<int>(ExitCodeOf(status)));
-    fmt::print("{}\n", error.Text());
-  }
   if (!status.ok()) {
-    fmt::print(stderr, "halflight: {}\n", MessageOf(status));
+    return Fail(ExitCodeOf(status), MessageOf(status), render_options.json || info_options.json);
   }
-  return ExitCodeOf(status);
+  return ExitCode::kOk;
+}
+
+// Files and sockets shall not get the numbers of standard streams that were closed: what is printed
+// would go into them.
+void OpenStandardStreams() {
+  int fd = 0;
+  do {
+    fd = open("/dev/null", O_RDWR);
+  } while (fd >= 0 && fd <= STDERR_FILENO);
+  close(fd);
+}
+
+ExitCode StdoutFailed(const char* reason) {
+  fmt::print(stderr, "halflight: stdout: cannot be written: {}\n", reason);
+  return ExitCode::kOutput;
 }
 
 }  // namespace
@@ -62,10 +114,24 @@ ExitCode Run(int argc, char** argv) {
 }  // namespace halflight::client
 
 int main(int argc, char** argv) {
+  using halflight::client::ExitCode;
+  halflight::client::OpenStandardStreams();
+  // A reader that leaves ends the program through an error, after which nothing is left behind.
+  std::signal(SIGPIPE, SIG_IGN);
+  ExitCode code = ExitCode::kFailed;
   try {
-    return static_cast<int>(halflight::client::Run(argc, argv));
+    code = halflight::client::Run(argc, argv);
+    if (std::fflush(stdout) != 0) {
+      code = halflight::client::StdoutFailed(std::strerror(errno));
+    } else if (std::ferror(stdout) != 0) {
+      code = halflight::client::StdoutFailed("it was full or closed while frames were reported");
+    }
   } catch (const std::exception& error) {
-    fmt::print(stderr, "halflight: {}\n", error.what());
-    return static_cast<int>(halflight::client::ExitCode::kFailed);
+    if (std::ferror(stdout) != 0) {
+      code = halflight::client::StdoutFailed(error.what());
+    } else {
+      fmt::print(stderr, "halflight: {}\n", error.what());
+    }
   }
+  return static_cast<int>(code);
 }

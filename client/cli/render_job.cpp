@@ -59,6 +59,13 @@ absl::Status CheckNames(const RenderOptions& options, const v1::RenderFrameReque
     return Usage("--output: is missing; allowed: -o frame.png, or -o NAME=PATH");
   }
   if (options.frames.empty()) {
+    const bool looks_like_pattern = CheckPattern(options.input).ok();
+    if (looks_like_pattern && access(options.input.c_str(), F_OK) != 0) {
+      return Usage(
+          fmt::format("--frames: is missing for the input pattern '{}'; allowed: such as "
+                      "24-40",
+                      options.input));
+    }
     return absl::OkStatus();
   }
   if (const absl::Status status = CheckPattern(options.input); !status.ok()) {

@@ -57,10 +57,11 @@ std::string FrameText(const FrameReport& report, const RenderedFrame& frame) {
     text += fmt::format(", {} bytes\n", frame.outputs[i].size());
   }
   const v1::FrameMetadata& metadata = frame.header.metadata();
-  text += fmt::format("{}{} particles in {:.0f} ms (server {:.0f} ms) on {}\n",
-                      report.frame ? fmt::format("frame {}: ", *report.frame) : "",
-                      metadata.particle_count(), report.milliseconds,
-                      ServerMilliseconds(frame.header), metadata.gl_renderer());
+  text +=
+      fmt::format("{}{} particle{} in {:.0f} ms (server {:.0f} ms) on {}\n",
+                  report.frame ? fmt::format("frame {}: ", *report.frame) : "",
+                  metadata.particle_count(), metadata.particle_count() == 1 ? "" : "s",
+                  report.milliseconds, ServerMilliseconds(frame.header), metadata.gl_renderer());
   if (metadata.clamped_opacities() > 0) {
     text += fmt::format("{} opacities above 1 - 2^-20 were drawn as that\n",
                         metadata.clamped_opacities());

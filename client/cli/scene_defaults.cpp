@@ -20,7 +20,8 @@ void ToProto(const Vec3& from, v1::Vector3& to) {
   to.set_z(from[2]);
 }
 
-std::string Text(const Vec3& v) { return fmt::format("{:.6g},{:.6g},{:.6g}", v[0], v[1], v[2]); }
+// Enough digits to tell the eye from the target where coordinates are large.
+std::string Text(const Vec3& v) { return fmt::format("{:.9g},{:.9g},{:.9g}", v[0], v[1], v[2]); }
 
 bool AllHave(const std::vector<const Particles*>& clouds, std::vector<float> Particles::*array) {
   return std::all_of(clouds.begin(), clouds.end(), [array](const Particles* cloud) {
@@ -35,7 +36,8 @@ double ChooseRadius(const std::vector<const Particles*>& clouds, v1::Scene& scen
                                    [](const Particles* cloud) { return cloud->size() > 0; });
   if (filled != clouds.end() && AllHave(clouds, &Particles::radii)) {
     const auto [low, high] = std::minmax_element((*filled)->radii.begin(), (*filled)->radii.end());
-    choices.push_back({"radius", fmt::format("{:.6g} to {:.6g}, from the file", *low, *high)});
+    const std::string upward = *low < *high ? fmt::format(" to {:.6g}", *high) : "";
+    choices.push_back({"radius", fmt::format("{:.6g}{}, from the file", *low, upward)});
     return 1;
   }
   if (scene.material().has_radius()) {

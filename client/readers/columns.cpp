@@ -9,6 +9,8 @@
 #include <utility>
 
 #include "absl/strings/ascii.h"
+#include "client/readers/text.h"
+#include "halflight/particle_payload.h"
 
 namespace halflight::client {
 
@@ -42,7 +44,7 @@ const std::vector<Naming>& Namings() {
 std::string Quoted(const std::vector<std::string>& names) {
   std::string text;
   for (const std::string& name : names) {
-    text += fmt::format("{}'{}'", text.empty() ? "" : ", ", name);
+    text += fmt::format("{}'{}'", text.empty() ? "" : ", ", Excerpt(name));
   }
   return text.empty() ? "none" : text;
 }
@@ -60,14 +62,14 @@ std::optional<size_t> Find(const std::vector<std::string>& names, std::string_vi
 const char* WhatIsAllowed(Attribute attribute, float value) {
   switch (attribute) {
     case Attribute::kRadius:
-      return std::isfinite(value) && value > 0 ? nullptr : "finite and > 0";
+      return value >= kSmallestRadius && value <= kLargestLength ? nullptr : "in [1e-15, 1e17]";
     case Attribute::kOpacity:
       return value >= 0 && value <= 1 ? nullptr : "in [0, 1]";
     case Attribute::kColor:
     case Attribute::kEmission:
       return std::isfinite(value) && value >= 0 ? nullptr : "finite and >= 0";
     default:
-      return std::isfinite(value) ? nullptr : "finite in 32-bit float";
+      return std::abs(value) <= kLargestLength ? nullptr : "in [-1e17, 1e17]";
   }
 }
 
@@ -188,9 +190,9 @@ absl::StatusOr<Particles> ParticlesFromColumns(Columns columns) {
   for (size_t i = 0; i < columns.positions.size(); ++i) {
     const double offset = columns.positions[i] - particles.origin[i % 3];
     particles.positions[i] = static_cast<float>(offset);
-    if (!std::isfinite(particles.positions[i])) {
+    if (!(std::abs(offset) <= kLargestLength)) {
       return BadValue(i / 3, Attribute::kPosition, i % 3, columns.positions[i],
-                      "finite as a 32-bit offset from the cloud's centre");
+                      "at most 1e17 from the cloud's centre along each axis");
     }
   }
   auto take = [&columns](Attribute attribute) {

@@ -1,5 +1,6 @@
 // The bytes of a particle set as particles.proto defines them: which arrays, how many bytes, and
-// the name of the set. Shared by client and server; knows nothing of what the values mean.
+// the name of the set. Shared by client and server; of what the values mean it knows only how large
+// a length may be.
 #pragma once
 
 #include <array>
@@ -27,6 +28,11 @@ inline constexpr std::array<AttributeFormat, 6> kAttributeFormats = {{
     {v1::PARTICLE_ATTRIBUTE_VELOCITY, "velocity", 3},
     {v1::PARTICLE_ATTRIBUTE_EMISSION, "emission", 3},
 }};
+
+// Lengths between which 32-bit floats can hold the squares and inverse squares that rendering
+// needs, with room for the distances round them.
+inline constexpr double kLargestLength = 1e17;
+inline constexpr double kSmallestRadius = 1e-15;
 
 bool HasAttribute(const v1::ParticleLayout& layout, v1::ParticleAttribute attribute);
 

@@ -71,10 +71,11 @@ Material ConvertMaterial(const v1::Material& material, const ParticleSet& partic
       FromProto(kProfiles, material.profile(), converted.profile, path + ".profile", checks);
   if (material.has_radius()) {
     if (particles.radii.empty()) {
-      converted.radius = checks.InRange(path + ".radius", material.radius(), kPositive);
+      converted.radius = checks.InRange(path + ".radius", material.radius(), kRadius);
     }
   } else if (particles.radii.empty() && particles.size() > 0) {
-    checks.Reject(path + ".radius", "unset", "> 0 where the particle set has no RADIUS");
+    checks.Reject(path + ".radius", "unset",
+                  kRadius.ToString() + " where the particle set has no RADIUS");
   }
   if (material.has_opacity() && particles.opacities.empty()) {
     converted.opacity =
@@ -127,6 +128,20 @@ ShadowSettings ConvertShadow(const v1::Shadow& shadow, const ServerLimits& limit
                   "unset, unless blur_mode is BLUR_MODE_TEXELS_PER_SLICE");
   }
   return converted;
+}
+
+// Positions as they are after the offset keep to the bounds of those that are sent.
+void CheckMoved(const ParticleSet& particles, double time_offset_s, FieldChecks& checks) {
+  for (size_t i = 0; i < particles.velocities.size() && checks.ok(); ++i) {
+    const glm::dvec3 moved =
+        glm::dvec3(particles.positions[i]) + time_offset_s * glm::dvec3(particles.velocities[i]);
+    if (!kOffset.Contains(moved.x) || !kOffset.Contains(moved.y) || !kOffset.Contains(moved.z)) {
+      checks.Reject("scene.time_offset_s",
+                    fmt::format("{}, which moves particle {} to ({}, {}, {})", time_offset_s, i,
+                                moved.x, moved.y, moved.z),
+                    "positions in " + kOffset.ToString());
+    }
+  }
 }
 
 // Half-angle slicing looks at the particles from the light through one frustum, so that a light
@@ -183,6 +198,9 @@ Scene ConvertScene(const v1::Scene& scene, std::shared_ptr<const ParticleSet> pa
       converted.particles->size() > 0) {
     checks.Reject("scene.time_offset_s", fmt::format("{}", converted.time_offset_s),
                   "0 or unset where the particle set has no VELOCITY");
+  }
+  if (converted.time_offset_s != 0.0) {
+    CheckMoved(*converted.particles, converted.time_offset_s, checks);
   }
   if (checks.ok() && converted.shadow.technique == ShadowTechniqueKind::kHalfAngle) {
     CheckPointLights(converted, checks);

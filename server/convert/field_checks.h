@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 
 #include "absl/status/status.h"
+#include "halflight/particle_payload.h"
 
 namespace halflight {
 
@@ -31,6 +32,9 @@ struct Interval {
 inline constexpr Interval kFinite{};
 inline constexpr Interval kPositive{.low = 0.0, .open_low = true};
 inline constexpr Interval kNotNegative{.low = 0.0};
+// Of particles, world units.
+inline constexpr Interval kOffset{.low = -kLargestLength, .high = kLargestLength};
+inline constexpr Interval kRadius{.low = kSmallestRadius, .high = kLargestLength};
 
 // InvalidArgument "<field>: <value>, allowed: <allowed>".
 absl::Status FieldError(const std::string& field, const std::string& value,

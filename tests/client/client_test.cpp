@@ -5,6 +5,7 @@
 
 #include <thread>
 
+#include "client/status_text.h"
 #include "halflight/sha256.h"
 #include "tests/client/fake_service.h"
 #include "tests/client/test_bytes.h"
@@ -194,6 +195,16 @@ TEST_F(ClientTest, EndsAtItsDeadline) {
   const auto start = std::chrono::steady_clock::now();
   EXPECT_FALSE(Connect(options).GetServerInfo().ok());
   EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(5));
+}
+
+TEST_F(ClientTest, SaysWhichTimeWasTooShort) {
+  service_.FailNext("GetServerInfo", {{grpc::StatusCode::DEADLINE_EXCEEDED, "Deadline Exceeded"}});
+  ClientOptions options;
+  options.timeout = std::chrono::milliseconds(5000);
+  const absl::Status status = Connect(options).GetServerInfo().status();
+  EXPECT_EQ(status.code(), absl::StatusCode::kDeadlineExceeded);
+  EXPECT_THAT(MessageOf(status), testing::HasSubstr("timeout: 5 s"));
+  EXPECT_THAT(MessageOf(status), testing::HasSubstr(service_.address()));
 }
 
 TEST_F(ClientTest, EndsWhenStopped) {

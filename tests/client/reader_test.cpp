@@ -65,13 +65,17 @@ TEST(ReadParticles, NamesTheParticleWhoseValueIsImpossible) {
   for (const Case& bad : {
            Case{"x,y,z\n0,0,0\n0,nan,0\n", {"particle 1", "position.y is nan", "finite"}},
            Case{"x,y,z\n0,0,-inf\n", {"particle 0", "position.z is -inf"}},
-           Case{"x,y,z,radius\n0,0,0,1\n0,0,0,-2\n", {"particle 1", "radius is -2", "> 0"}},
+           Case{"x,y,z,radius\n0,0,0,1\n0,0,0,-2\n",
+                {"particle 1", "radius is -2", "[1e-15, 1e17]"}},
            Case{"x,y,z,radius\n0,0,0,0\n", {"particle 0", "radius is 0"}},
            Case{"x,y,z,radius\n0,0,0,nan\n", {"particle 0", "radius is nan"}},
            Case{"x,y,z,opacity\n0,0,0,1.5\n", {"particle 0", "opacity is 1.5", "[0, 1]"}},
            Case{"x,y,z,r,g,b\n0,0,0,1,-1,0\n", {"particle 0", "color.g is -1", ">= 0"}},
            Case{"x,y,z,vx,vy,vz\n0,0,0,1,2,1e300\n", {"particle 0", "velocity.z is inf"}},
-           Case{"x,y,z\n1e300,0,0\n-1e300,0,0\n", {"particle 0", "position.x", "32-bit"}},
+           Case{"x,y,\xff\n1,2,3\n", {"missing: 'z'", "found: 'x', 'y', '?'"}},
+           Case{"x,y,z\n3e38,0,0\n-3e38,1,1\n", {"particle 0", "position.x is 3e+38"}},
+           Case{"x,y,z,radius\n0,0,0,1e20\n", {"particle 0", "radius is 1"}},
+           Case{"x,y,z\n1e300,0,0\n-1e300,0,0\n", {"particle 0", "position.x", "at most 1e17"}},
        }) {
     ExpectError(ReadParticles(directory.Write("a.csv", bad.text)).status(),
                 StatusCode::kInvalidArgument, bad.message);

@@ -3,6 +3,7 @@
 #include "client/cli/render_command.h"
 
 #include <gmock/gmock.h>
+#include <unistd.h>
 
 #include <fstream>
 #include <sstream>
@@ -154,6 +155,29 @@ TEST_F(RenderCommandTest, TellsCausesApartByExitCode) {
   options_.connection.server = service_.address();
   stop_.request_stop();
   EXPECT_EQ(ExitCodeOf(Run()), ExitCode::kInterrupted);
+}
+
+TEST_F(RenderCommandTest, AsksForTheFramesOfAPattern) {
+  options_.input = directory_ / "a.%04d.csv";
+  Output("a.png");
+  const absl::Status status = Run();
+  EXPECT_EQ(ExitCodeOf(status), ExitCode::kUsage);
+  EXPECT_THAT(MessageOf(status), HasSubstr("--frames: is missing"));
+  // A file that has such a name is a file.
+  options_.input = directory_.Write("a.%04d.csv", kCloud);
+  EXPECT_TRUE(Run().ok());
+}
+
+TEST_F(RenderCommandTest, RendersNothingThatItMayNotWrite) {
+  if (geteuid() == 0) {
+    GTEST_SKIP() << "root may write everywhere";
+  }
+  options_.input = directory_.Write("a.csv", kCloud);
+  fs::create_directory(directory_ / "sealed");
+  fs::permissions(directory_ / "sealed", fs::perms::owner_read | fs::perms::owner_exec);
+  Output("sealed/a.png");
+  EXPECT_EQ(ExitCodeOf(Run()), ExitCode::kOutput);
+  EXPECT_EQ(service_.Calls("RenderFrame"), 0);
 }
 
 TEST_F(RenderCommandTest, RefusesToWriteOneFileTwice) {

@@ -224,7 +224,7 @@ INSTANTIATE_TEST_SUITE_P(
                   UseParticles(r, {v1::PARTICLE_ATTRIBUTE_POSITION});
                   MaterialOf(r).set_radius(0.0F);
                 },
-                "scene.material.radius: 0, allowed: > 0 and finite"},
+                "scene.material.radius: 0, allowed: [1e-15, 1e+17]"},
         Refusal{"OpacityAboveOne", [](Request& r) { MaterialOf(r).set_opacity(1.5F); },
                 "scene.material.opacity: 1.5, allowed: [0, 1]"},
         Refusal{"AlbedoNegative", [](Request& r) { MaterialOf(r).mutable_albedo()->set_r(-0.5F); },
@@ -376,9 +376,25 @@ INSTANTIATE_TEST_SUITE_P(
         Refusal{"PayloadShort", [](Request& r) { ParticlesOf(r).mutable_payload()->pop_back(); },
                 "scene.inline_particles.payload: 31 bytes, allowed: 32 bytes"},
         Refusal{"PositionNan", [](Request& r) { Poke(r, 4, kNan); },
-                "scene.inline_particles.position[1].y: nan, allowed: finite"},
+                "scene.inline_particles.position[1].y: nan, allowed: [-1e+17, 1e+17]"},
+        // Squares of such lengths are infinite in 32 bits: the frame would be empty without a word.
+        Refusal{"PositionTooFar", [](Request& r) { Poke(r, 0, 1e20); },
+                "scene.inline_particles.position[0].x: 1e+20, allowed: [-1e+17, 1e+17]"},
+        Refusal{"RadiusTooLarge", [](Request& r) { Poke(r, 6, 1e20); },
+                "scene.inline_particles.radius[0]: 1e+20, allowed: [1e-15, 1e+17]"},
+        Refusal{"RadiusTooSmall", [](Request& r) { Poke(r, 6, 1e-20); },
+                "scene.inline_particles.radius[0]: 1e-20, allowed: [1e-15, 1e+17]"},
+        Refusal{
+            "MovedTooFar",
+            [](Request& r) {
+              UseParticles(r, {v1::PARTICLE_ATTRIBUTE_POSITION, v1::PARTICLE_ATTRIBUTE_VELOCITY});
+              MaterialOf(r).set_radius(1.0F);
+              Poke(r, 9, 1e10);
+              r.mutable_scene()->set_time_offset_s(1e9);
+            },
+            "scene.time_offset_s: 1000000000, which moves particle 1 to"},
         Refusal{"RadiusZero", [](Request& r) { Poke(r, 7, 0.0); },
-                "scene.inline_particles.radius[1]: 0, allowed: > 0 and finite"},
+                "scene.inline_particles.radius[1]: 0, allowed: [1e-15, 1e+17]"},
         Refusal{"RadiusNegative", [](Request& r) { Poke(r, 6, -2.0); },
                 "scene.inline_particles.radius[0]: -2"},
         Refusal{
