@@ -28,14 +28,14 @@ HALFLIGHT_CONSTANT(kBlurBinding, 3);
 HALFLIGHT_CONSTANT(kResolveBinding, 4);
 
 // Storage buffers.
-HALFLIGHT_CONSTANT(kOrderBinding, 0);         // OrderedParticle[]
-HALFLIGHT_CONSTANT(kPositionsBinding, 1);     // float[3 N]
-HALFLIGHT_CONSTANT(kRadiiBinding, 2);         // float[N]
-HALFLIGHT_CONSTANT(kOpticalDepthsBinding, 3); // float[N]
-HALFLIGHT_CONSTANT(kColorsBinding, 4);        // float[3 N]
-HALFLIGHT_CONSTANT(kEmissionsBinding, 5);     // float[3 N]
-HALFLIGHT_CONSTANT(kSplatsBinding, 6);        // Splat[N], as the eye sees the particles
-HALFLIGHT_CONSTANT(kLightSplatsBinding, 7);   // Splat[N], as the light does
+HALFLIGHT_CONSTANT(kOrderBinding, 0);          // OrderedParticle[]
+HALFLIGHT_CONSTANT(kPositionsBinding, 1);      // float[3 N]
+HALFLIGHT_CONSTANT(kRadiiBinding, 2);          // float[N]
+HALFLIGHT_CONSTANT(kOpticalDepthsBinding, 3);  // float[N]
+HALFLIGHT_CONSTANT(kColorsBinding, 4);         // float[3 N]
+HALFLIGHT_CONSTANT(kEmissionsBinding, 5);      // float[3 N]
+HALFLIGHT_CONSTANT(kSplatsBinding, 6);         // Splat[N], as the eye sees the particles
+HALFLIGHT_CONSTANT(kLightSplatsBinding, 7);    // Splat[N], as the light does
 
 // Textures.
 HALFLIGHT_CONSTANT(kLightBeforeBinding, 0);  // light buffer without the current slice
@@ -70,11 +70,11 @@ HALFLIGHT_CONSTANT(kMaxBlurRadius, 63);  // texels to each side
 // with w the depth along the axis (perspective), or x, y in world units (orthographic); y is up.
 // Pixel coordinates count from the target's first row, which is the top of the image.
 struct ProjectionBlock {
-  mat4 view_from_world;      // rotation only
-  vec4 origin_from_eye;      // xyz: particle origin minus eye, world axes
-  vec4 pixel_from_plane;     // xy: scale, zw: offset
-  vec4 plane_from_pixel;     // the inverse
-  vec4 target_size;          // xy: pixels; z: radii below this are drawn as this (plane units)
+  mat4 view_from_world;   // rotation only
+  vec4 origin_from_eye;   // xyz: particle origin minus eye, world axes
+  vec4 pixel_from_plane;  // xy: scale, zw: offset
+  vec4 plane_from_pixel;  // the inverse
+  vec4 target_size;       // xy: pixels; z: radii below this are drawn as this (plane units)
 };
 
 // Values that serve where the particle set has no attribute of its own.
@@ -103,19 +103,19 @@ struct LightBlock {
 };
 
 struct CompositeBlock {
-  mat4 light_view_from_view;    // rotation only; of the light that casts shadows
+  mat4 light_view_from_view;      // rotation only; of the light that casts shadows
   vec4 light_texture_from_plane;  // xy: scale, zw: offset, to texture coordinates
-  vec4 albedo;                  // rgb; w: phase g
-  vec4 emission;                // rgb
-  vec4 density;                 // rgb shadow density
-  vec4 constant_light;          // rgb; unshadowed and the same everywhere, ambient included
-  vec4 constant_shadowed;       // rgb; the shadow casting light, where the same everywhere
+  vec4 albedo;                    // rgb; w: phase g
+  vec4 emission;                  // rgb
+  vec4 density;                   // rgb shadow density
+  vec4 constant_light;            // rgb; unshadowed and the same everywhere, ambient included
+  vec4 constant_shadowed;         // rgb; the shadow casting light, where the same everywhere
   LightBlock lights[kMaxLightsInTraversal];  // that vary; the one that casts shadows is the first
 };
 
 struct BlurBlock {
-  uvec4 axis;          // x, y: step in texels; z: radius in texels
-  vec4 density;        // rgb shadow density of the light
+  uvec4 axis;                              // x, y: step in texels; z: radius in texels
+  vec4 density;                            // rgb shadow density of the light
   vec4 weights[(kMaxBlurRadius + 1) / 4];  // by distance from the centre
 };
 
