@@ -10,6 +10,7 @@
 #include <glm/gtc/matrix_transform.hpp>
 
 #include "renderer/reference/evaluator.h"
+#include "tests/oracle/plume.h"
 #include "tests/reference/brute_force.h"
 #include "tests/reference/test_scenes.h"
 
@@ -149,6 +150,33 @@ INSTANTIATE_TEST_SUITE_P(
                     scene.lights[0].color = glm::vec3(1e3F);
                   }}),
     [](const auto& param) { return std::string(param.param.name); });
+
+TEST(ReferencePlume, EqualsBruteForceAtAFewPixels) {
+  Scene scene = EmptyScene(64);
+  auto set = oracle::LoadPlume(std::string(HALFLIGHT_TEST_DATA) + "/plume/plume.0040.ply");
+  ASSERT_NE(set, nullptr);
+  for (size_t i = 0; i < set->size(); ++i) {
+    set->radii.push_back(0.02F + 0.002F * static_cast<float>(i % 17));
+    set->opacities.push_back(0.05F + 0.02F * static_cast<float>(i % 13));
+    set->colors.emplace_back(1.0F, 0.1F * static_cast<float>(i % 11), 0.5F);
+    set->emissions.emplace_back(i % 29 == 0 ? 0.3F : 0.0F, 0.0F, 0.0F);
+  }
+  scene.particles = set;
+  scene.material.phase_g = 0.5F;
+  scene.camera.view_from_world =
+      glm::lookAt(glm::dvec3(0.5, 1.5, 4.6), glm::dvec3(0, 1.25, 0), glm::dvec3(0, 1, 0));
+  scene.camera.projection = Perspective{0.7};
+  scene.lights = {Sun(), Lamp({0.05, 1.0, 0.0}, true)};
+  const std::vector<glm::ivec2> pixels = {{32, 32}, {30, 40}, {35, 25}, {28, 36}};
+  const auto values = (*Evaluator::Create(scene))->Evaluate(pixels);
+  ASSERT_TRUE(values.ok());
+  for (size_t p = 0; p < pixels.size(); ++p) {
+    const BruteForcePixel expected = RenderByBruteForce(scene, pixels[p]);
+    EXPECT_GT(expected.rgba.a, 0.3);
+    ExpectNear(values->rgba[p], expected.rgba, 1e-9);
+    EXPECT_NEAR(values->depth[p], expected.depth, 1e-8);
+  }
+}
 
 }  // namespace
 }  // namespace halflight::reference
