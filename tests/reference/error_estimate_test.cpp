@@ -21,8 +21,6 @@
 namespace halflight {
 namespace {
 
-constexpr int kSize = 160;
-
 struct FrameCase {
   const char* name;
   const char* frame;
@@ -31,6 +29,7 @@ struct FrameCase {
   bool interpolate;
   int slices;
   glm::dvec3 light;
+  int size = 160;  // pixels along each side
 };
 
 Scene SceneOf(const FrameCase& frame) {
@@ -43,8 +42,8 @@ Scene SceneOf(const FrameCase& frame) {
   scene.shadow.interpolate = frame.interpolate;
   scene.camera.view_from_world =
       glm::lookAt(glm::dvec3(0.5, 1.5, 4.6), glm::dvec3(0, 1.25, 0), glm::dvec3(0, 1, 0));
-  scene.camera.width = scene.camera.height = kSize;
-  scene.camera.window = {0, 0, kSize, kSize};
+  scene.camera.width = scene.camera.height = frame.size;
+  scene.camera.window = {0, 0, frame.size, frame.size};
   Light light;
   light.kind = DirectionalLight{glm::normalize(frame.light)};
   scene.lights = {light};
@@ -136,7 +135,8 @@ TEST_P(ErrorEstimateOf, IsUnbiasedAndItsIntervalsHold) {
   ASSERT_NE(scene.particles, nullptr);
   const auto exact = (*reference::Evaluator::Create(scene))->EvaluateWindow();
   ASSERT_TRUE(exact.ok());
-  const KnownFrame frame(BeautyOf(oracle::RenderHalfAngle(scene).rgba, kSize), exact->rgba);
+  const KnownFrame frame(BeautyOf(oracle::RenderHalfAngle(scene).rgba, GetParam().size),
+                         exact->rgba);
   const double relative = std::sqrt(frame.mean_square_error) / frame.reference_mean;
   Tally square(frame.mean_square_error);
   Tally bias(frame.bias);
@@ -146,7 +146,7 @@ TEST_P(ErrorEstimateOf, IsUnbiasedAndItsIntervalsHold) {
   for (int seed = 0; seed < kSeeds; ++seed) {
     const ErrorEstimate estimate = frame.Estimate({.seed = static_cast<uint64_t>(seed)});
     ASSERT_EQ(estimate.covered_pixels, frame.covered);
-    ASSERT_EQ(estimate.sampled_pixels, 512U);
+    ASSERT_EQ(estimate.sampled_pixels, 1024U);
     square.Add(estimate.mean_square_error);
     bias.Add(estimate.bias);
     rmse.Add(estimate.rmse);
@@ -174,7 +174,9 @@ INSTANTIATE_TEST_SUITE_P(
         FrameCase{"ThinInterpolated", "0024", 0.045F, 0.02F, true, 32, {0.3, -0.4, 1}},
         FrameCase{"ThinPlain", "0024", 0.045F, 0.02F, false, 32, {-0.2, -0.3, -1}},
         FrameCase{"OpaqueFlipped", "0040", 0.03F, 0.5F, false, 128, {1, -0.2, 0.3}},
-        FrameCase{"NearlyRight", "0032", 0.045F, 0.18F, true, 512, {0.3, -0.4, 1}}),
+        FrameCase{"NearlyRight", "0032", 0.045F, 0.18F, true, 512, {0.3, -0.4, 1}},
+        // Few of many pixels, and most of the error in few of them.
+        FrameCase{"LargeNearlyRight", "0032", 0.07F, 0.18F, true, 512, {0.3, -0.4, 1}, 400}),
     [](const auto& param) { return std::string(param.param.name); });
 
 // A frame of a gradient whose error is known at every pixel.
