@@ -24,6 +24,9 @@ double CellSizeFor(size_t particles) {
   return particles <= 1'500'000 ? 1.0 : 2.0;
 }
 
+// Particles between two looks at whether to stop.
+constexpr size_t kBetweenStops = 4096;
+
 // How large the rays see a particle.
 double SizeOf(const Particle& particle, const Rays& rays) {
   if (rays.parallel()) return particle.radius;
@@ -90,11 +93,10 @@ RayIndex::RayIndex(const Rays& rays, const Cloud& cloud, std::span<const uint32_
     axis_u_ = glm::normalize(glm::cross(direction, helper));
     axis_v_ = glm::cross(direction, axis_u_);
   }
-  const std::vector<uint8_t> level_of_rank = ChooseLevels(cloud, order);
-  FitGrids(cloud, order, level_of_rank);
+  const std::vector<uint8_t> level_of_rank = ChooseLevels(cloud, order, stop);
+  FitGrids(cloud, order, level_of_rank, stop);
 
   // Count the entries of each cell, then place them: by ascending rank within a cell.
-  constexpr size_t kBetweenStops = 4096;
   const auto for_each_entry = [&](const auto& enter) {
     for (size_t rank = 0; rank < order.size(); ++rank) {
       if (rank % kBetweenStops == 0 && stop.stop_requested()) return;
@@ -109,7 +111,8 @@ RayIndex::RayIndex(const Rays& rays, const Cloud& cloud, std::span<const uint32_
   for_each_entry([this, &next](size_t cell, uint32_t rank) { ranks_[next[cell]++] = rank; });
 }
 
-std::vector<uint8_t> RayIndex::ChooseLevels(const Cloud& cloud, std::span<const uint32_t> order) {
+std::vector<uint8_t> RayIndex::ChooseLevels(const Cloud& cloud, std::span<const uint32_t> order,
+                                            const std::stop_token& stop) {
   double smallest = std::numeric_limits<double>::infinity();
   for (const uint32_t index : order) {
     smallest = std::min(smallest, SizeOf(cloud.particles[index], rays_));
@@ -117,6 +120,7 @@ std::vector<uint8_t> RayIndex::ChooseLevels(const Cloud& cloud, std::span<const 
   std::vector<uint8_t> level_of_rank(order.size());
   std::vector<size_t> count;
   for (size_t rank = 0; rank < order.size(); ++rank) {
+    if (rank % kBetweenStops == 0 && stop.stop_requested()) break;
     const double size = SizeOf(cloud.particles[order[rank]], rays_);
     const double level = std::floor(std::log(size / smallest) / std::log(kSizesOfLevel));
     level_of_rank[rank] = static_cast<uint8_t>(std::clamp(level, 0.0, kMostLevels - 1.0));
@@ -133,11 +137,12 @@ std::vector<uint8_t> RayIndex::ChooseLevels(const Cloud& cloud, std::span<const 
 }
 
 void RayIndex::FitGrids(const Cloud& cloud, std::span<const uint32_t> order,
-                        std::span<const uint8_t> level_of_rank) {
+                        std::span<const uint8_t> level_of_rank, const std::stop_token& stop) {
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   std::vector<PlaneRect> bounds(levels_ * faces(), {glm::dvec2(kInfinity), glm::dvec2(-kInfinity)});
   std::vector<size_t> count(bounds.size());
   for (size_t rank = 0; rank < order.size(); ++rank) {
+    if (rank % kBetweenStops == 0 && stop.stop_requested()) break;
     const Particle& particle = cloud.particles[order[rank]];
     for (size_t face = 0; face < faces(); ++face) {
       const size_t grid = level_of_rank[rank] * faces() + face;

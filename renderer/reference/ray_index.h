@@ -59,9 +59,10 @@ class RayIndex {
   [[nodiscard]] size_t faces() const { return rays_.parallel() ? 1 : 6; }
   [[nodiscard]] Place PlaceOf(const glm::dvec3& x) const;
   [[nodiscard]] std::vector<uint8_t> ChooseLevels(const Cloud& cloud,
-                                                  std::span<const uint32_t> order);
+                                                  std::span<const uint32_t> order,
+                                                  const std::stop_token& stop);
   void FitGrids(const Cloud& cloud, std::span<const uint32_t> order,
-                std::span<const uint8_t> level_of_rank);
+                std::span<const uint8_t> level_of_rank, const std::stop_token& stop);
   // Calls enter(cell) for every cell whose rays may meet the particle.
   template <typename Enter>
   void VisitCells(const Particle& particle, uint8_t level, const Enter& enter) const;
