@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "renderer/frame.h"
+#include "renderer/reference_frame.h"
 #include "renderer/shadow_technique.h"
 
 namespace halflight {
@@ -49,6 +50,7 @@ void DescribePasses(const Scene& scene, FramePlan& plan) {
 
 absl::StatusOr<FramePlan> PlanFrame(const FrameRequest& request, const ParticleView& particles) {
   const Scene& scene = request.scene;
+  if (scene.shadow.technique == ShadowTechniqueKind::kReference) return PlanReferenceFrame(request);
   FramePlan plan;
   plan.window_size = {scene.camera.window.width, scene.camera.window.height};
   plan.composite_size = CompositeSize(scene.camera.window, scene.sampling);

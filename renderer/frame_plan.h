@@ -52,7 +52,7 @@ struct FramePlan {
   glm::ivec2 window_size{0};          // pixels of the image
   glm::ivec2 composite_size{0};       // pixels composited, after super- or downsampling
   bool keep_depth = false;            // an output shows it; drawn by the first traversal
-  std::vector<Traversal> traversals;  // at least one
+  std::vector<Traversal> traversals;  // at least one, but for the reference: none
   std::vector<PlannedPass> passes;    // what the above comes to, for people
 };
 

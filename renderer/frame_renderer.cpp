@@ -8,6 +8,7 @@
 #include "renderer/passes/composite.h"
 #include "renderer/passes/project.h"
 #include "renderer/passes/resolve.h"
+#include "renderer/reference_frame.h"
 #include "renderer/shadow_technique.h"
 #include "renderer/traversal_context.h"
 
@@ -142,6 +143,15 @@ absl::StatusOr<FrameResult> FrameRenderer::Render(const FrameRequest& request,
   const ParticleView particles(scene);
   absl::StatusOr<FramePlan> plan = PlanFrame(request, particles);
   if (!plan.ok()) return plan.status();
+  if (scene.shadow.technique == ShadowTechniqueKind::kReference) {
+    clock.BeginCpu("reference");
+    absl::StatusOr<FrameResult> result = RenderReferenceFrame(request, stop);
+    if (!result.ok()) return result.status();
+    result->plan = *std::move(plan);
+    result->clamped_opacities = particles.clamped_opacities();
+    result->timings = clock.Finish();
+    return result;
+  }
   if (absl::Status status = CheckTargetSize(*plan, device()); !status.ok()) return status;
 
   // Bring particles and camera to the device.

@@ -90,7 +90,10 @@ struct Material {
   float scattering_spread = 0.0F;  // world units of standard deviation at distance 1
 };
 
-enum class ShadowTechniqueKind : uint8_t { kHalfAngle };
+enum class ShadowTechniqueKind : uint8_t {
+  kHalfAngle,
+  kReference,  // the image model itself, on the CPU
+};
 enum class SliceSpacing : uint8_t { kEqualCount, kEqualOpticalDepth };
 enum class BlurMode : uint8_t { kDistance, kTexelsPerSlice };
 

@@ -7,6 +7,7 @@ namespace halflight {
 const ShadowTechnique& TechniqueFor(ShadowTechniqueKind kind) {
   switch (kind) {
     case ShadowTechniqueKind::kHalfAngle:
+    case ShadowTechniqueKind::kReference:
       break;
   }
   static const HalfAngle half_angle;

@@ -41,6 +41,7 @@ class ShadowTechnique {
                                             LightReport& report) const = 0;
 };
 
+// Of all kinds but kReference, which draws no traversals (reference_frame.h).
 const ShadowTechnique& TechniqueFor(ShadowTechniqueKind kind);
 
 }  // namespace halflight

@@ -24,6 +24,9 @@ struct ServerLimits {
   uint64_t max_output_bytes = 1 * kGiB;
   uint64_t max_message_bytes = 2 * kMiB;
   uint32_t max_queued_frames = 64;
+  // Samples times particles: about a minute on two cores where particles overlap a few hundred
+  // deep.
+  uint64_t max_reference_work = 400'000'000'000;
 };
 
 inline constexpr uint32_t kMinLightBufferSize = 16;

@@ -71,6 +71,8 @@ void AddFlags(CLI::App& app, Options& options) {
   number("--max-outputs", limits.max_outputs, "Outputs of a frame");
   bytes("--max-output-bytes", limits.max_output_bytes,
         "Pixels of all outputs of a frame, in bytes of 32-bit float");
+  number("--max-reference-work", limits.max_reference_work,
+         "Samples times particles of a frame of technique REFERENCE");
   number("--max-queued-frames", limits.max_queued_frames,
          "Frames waiting, rendering or encoding, of all clients together");
   bytes("--max-message-bytes", limits.max_message_bytes, "Largest message received");
@@ -122,6 +124,7 @@ absl::Status Check(const Options& options) {
   checks.InRange("--max-output-bytes", limits.max_output_bytes, {.low = 1.0});
   checks.InRange("--max-queued-frames", limits.max_queued_frames, {.low = 1.0, .high = 65536.0});
   // Room for a chunk of 64 KiB, the smallest that particles.proto recommends, and what is round it.
+  checks.InRange("--max-reference-work", limits.max_reference_work, {.low = 0.0});
   checks.InRange("--max-message-bytes", limits.max_message_bytes,
                  {.low = 128.0 * 1024.0, .high = std::numeric_limits<int32_t>::max()});
   checks.InRange("--max-particle-bytes", limits.max_particle_bytes, {.low = 1.0});

@@ -149,9 +149,11 @@ void AddMaterialFlags(CLI::App& app, RenderOptions& options) {
 }
 
 void AddShadowFlags(CLI::App& app, RenderOptions& options) {
-  AddChoice<v1::ShadowTechnique>(app, "--technique", options.technique,
-                                 {{"half-angle", v1::SHADOW_TECHNIQUE_HALF_ANGLE}},
-                                 "How shadows are computed");
+  AddChoice<v1::ShadowTechnique>(
+      app, "--technique", options.technique,
+      {{"half-angle", v1::SHADOW_TECHNIQUE_HALF_ANGLE},
+       {"reference", v1::SHADOW_TECHNIQUE_REFERENCE}},
+      "How shadows are computed; reference: exactly, in float64 on the CPU");
   AddCount(app, "--slices", options.slices, 1, INT32_MAX, "Slices; default: 128");
   app.add_flag("--plain", options.plain, "Do not interpolate the light within a slice");
   AddChoice<v1::SliceSpacing>(app, "--spacing", options.spacing,

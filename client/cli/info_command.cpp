@@ -38,11 +38,12 @@ void Print(const v1::GetServerInfoResponse& info) {
   fmt::print(
       "limits: {} particles, {} bytes a set, {} bytes of sets\n"
       "        image side {}, light buffer {}, slices {}, lights {}, outputs {}\n"
-      "        {} bytes of output, {} bytes a message, {} frames queued\n",
+      "        {} bytes of output, {} bytes a message, {} frames queued\n"
+      "        {} samples times particles of the reference\n",
       limits.max_particles(), limits.max_particle_bytes(), limits.max_cache_bytes(),
       limits.max_image_size(), limits.max_light_buffer_size(), limits.max_slices(),
       limits.max_lights(), limits.max_outputs(), limits.max_output_bytes(),
-      limits.max_message_bytes(), limits.max_queued_frames());
+      limits.max_message_bytes(), limits.max_queued_frames(), limits.max_reference_work());
 }
 
 }  // namespace

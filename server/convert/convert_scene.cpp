@@ -167,6 +167,22 @@ void CheckPointLights(const Scene& scene, FieldChecks& checks) {
   }
 }
 
+// The reference takes time in proportion to what it samples, and to what each sample may meet; and
+// however few samples there are, memory in proportion to the particles.
+void CheckReferenceWork(const Scene& scene, const ServerLimits& limits, FieldChecks& checks) {
+  constexpr double kLeastSamples = 65536.0;
+  const double samples = std::max(
+      kLeastSamples, static_cast<double>(scene.camera.window.width) * scene.camera.window.height *
+                         scene.sampling.supersample * scene.sampling.supersample);
+  const auto particles = static_cast<double>(scene.particles->size());
+  if (samples * particles > static_cast<double>(limits.max_reference_work)) {
+    checks.Reject("scene.shadow.technique",
+                  fmt::format("SHADOW_TECHNIQUE_REFERENCE of {} samples times {} particles",
+                              samples, particles),
+                  fmt::format("a product of at most {}", limits.max_reference_work));
+  }
+}
+
 }  // namespace
 
 Scene ConvertScene(const v1::Scene& scene, std::shared_ptr<const ParticleSet> particles,
@@ -204,6 +220,9 @@ Scene ConvertScene(const v1::Scene& scene, std::shared_ptr<const ParticleSet> pa
   }
   if (checks.ok() && converted.shadow.technique == ShadowTechniqueKind::kHalfAngle) {
     CheckPointLights(converted, checks);
+  }
+  if (checks.ok() && converted.shadow.technique == ShadowTechniqueKind::kReference) {
+    CheckReferenceWork(converted, limits, checks);
   }
   return converted;
 }

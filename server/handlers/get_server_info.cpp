@@ -19,6 +19,7 @@ v1::GetServerInfoResponse GetServerInfo(const Backend& backend) {
   told.set_max_light_buffer_size(limits.max_light_buffer_size);
   told.set_max_slices(limits.max_slices);
   told.set_max_lights(limits.max_lights);
+  told.set_max_reference_work(limits.max_reference_work);
   told.set_max_outputs(limits.max_outputs);
   told.set_max_output_bytes(limits.max_output_bytes);
   told.set_max_message_bytes(limits.max_message_bytes);

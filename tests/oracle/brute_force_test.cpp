@@ -1,4 +1,4 @@
-// The oracle against the definitions written out as loops over all particles.
+// Half-angle slicing of one particle a slice, against loops over all particles.
 // Slices of several particles are left to oracle_test.cpp.
 #include <algorithm>
 #include <cmath>
@@ -12,10 +12,14 @@
 #include <glm/geometric.hpp>
 
 #include "tests/oracle/oracle.h"
-#include "tests/oracle/test_scenes.h"
+#include "tests/reference/test_scenes.h"
 
 namespace halflight::oracle {
 namespace {
+
+using reference::ExpectNear;
+using reference::RandomScene;
+using reference::RayOf;
 
 // The image model's sums for one ray from the eye at (0, 0, 10), with nothing but loops.
 struct BruteForce {
@@ -74,47 +78,6 @@ std::vector<size_t> Sorted(size_t count, const std::function<double(size_t)>& ke
   std::stable_sort(order.begin(), order.end(),
                    [&key](size_t a, size_t b) { return key(a) < key(b); });
   return order;
-}
-
-TEST(Oracle, ExactModelEqualsBruteForce) {
-  Scene scene = RandomScene(60, 15);
-  scene.time_offset_s = 0.5;
-  Light light;
-  light.color = {1.0F, 2.0F, 3.0F};
-  light.shadow_density = {1.0F, 0.5F, 2.0F};
-  for (const bool point : {false, true}) {
-    const glm::dvec3 direction = glm::normalize(glm::dvec3(0.5, -1.0, 0.2));
-    const glm::dvec3 position(0.2, 0.4, -0.3);  // among the particles
-    if (point) {
-      light.kind = PointLight{position, true};
-    } else {
-      light.kind = DirectionalLight{direction};
-    }
-    scene.lights = {light};
-    const BruteForce brute{scene};
-    const size_t count = scene.particles->size();
-    const auto depth = [&](size_t i) {
-      return point ? glm::distance(brute.Center(i), position)
-                   : glm::dot(brute.Center(i), direction);
-    };
-    const OracleImage image = RenderExact(scene);
-    for (size_t p = 0; p < image.pixels.size(); ++p) {
-      const glm::dvec3 d = RayOf(scene, image.pixels[p]);
-      const auto order =
-          Sorted(count, [&](size_t i) { return glm::dot(brute.Center(i) - brute.eye, d); });
-      const glm::dvec4 expected = brute.Blend(d, order, [&](size_t i, const glm::dvec3& x) {
-        const glm::dvec3 ray = point ? glm::normalize(x - position) : direction;
-        double sum = 0.0;
-        for (size_t j = 0; j < count; ++j) {
-          if (j == i || depth(j) >= depth(i)) continue;
-          if (point && glm::dot(brute.Center(j) - position, ray) <= 0.0) continue;
-          sum += brute.OpticalDepth(j, x, ray);
-        }
-        return glm::exp(-glm::dvec3(light.shadow_density) * sum);
-      });
-      ExpectNear(image.rgba[p], expected, 1e-9);
-    }
-  }
 }
 
 struct HalfAngleCase {

@@ -18,10 +18,10 @@ std::vector<uint64_t> EndsByCount(uint64_t particles, uint64_t slices) {
 }
 
 // As above; a particle belongs where the middle of its weight lies in the running total.
-std::vector<uint64_t> EndsByOpticalDepth(const Cloud& cloud, const std::vector<uint32_t>& order,
-                                         uint64_t slices) {
+std::vector<uint64_t> EndsByOpticalDepth(const reference::Cloud& cloud,
+                                         const std::vector<uint32_t>& order, uint64_t slices) {
   const auto weight = [&](uint32_t index) {
-    const Particle& particle = cloud.particles[index];
+    const reference::Particle& particle = cloud.particles[index];
     return particle.optical_depth * particle.radius * particle.radius;
   };
   double total = 0.0;
@@ -41,8 +41,8 @@ std::vector<uint64_t> EndsByOpticalDepth(const Cloud& cloud, const std::vector<u
 
 }  // namespace
 
-HalfAngleOrder OrderByHalfAngle(const Cloud& cloud, const Rays& light, const glm::dvec3& view,
-                                const ShadowSettings& settings) {
+HalfAngleOrder OrderByHalfAngle(const reference::Cloud& cloud, const reference::Rays& light,
+                                const glm::dvec3& view, const ShadowSettings& settings) {
   const glm::dvec3 travel = light.DirectionAt(cloud.bounds_center);
   const bool same_way = glm::dot(view, travel) > 0.0;
   HalfAngleOrder result{.axis = glm::normalize(same_way ? view + travel : travel - view),
@@ -51,7 +51,7 @@ HalfAngleOrder OrderByHalfAngle(const Cloud& cloud, const Rays& light, const glm
                         .places = {}};
 
   std::vector<float> keys;
-  for (const Particle& particle : cloud.particles) {
+  for (const reference::Particle& particle : cloud.particles) {
     keys.push_back(
         static_cast<float>(glm::dot(particle.center - cloud.bounds_center, result.axis)));
   }

@@ -7,9 +7,9 @@
 
 #include <glm/vec3.hpp>
 
+#include "renderer/reference/cloud.h"
+#include "renderer/reference/rays.h"
 #include "renderer/scene.h"
-#include "tests/oracle/cloud.h"
-#include "tests/oracle/ray_index.h"
 
 namespace halflight::oracle {
 
@@ -28,7 +28,7 @@ struct HalfAngleOrder {
 };
 
 // `view` is the camera's forward direction, of unit length.
-HalfAngleOrder OrderByHalfAngle(const Cloud& cloud, const Rays& light, const glm::dvec3& view,
-                                const ShadowSettings& settings);
+HalfAngleOrder OrderByHalfAngle(const reference::Cloud& cloud, const reference::Rays& light,
+                                const glm::dvec3& view, const ShadowSettings& settings);
 
 }  // namespace halflight::oracle

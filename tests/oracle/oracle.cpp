@@ -1,33 +1,25 @@
-// Which walks each way of rendering takes, and what light reaches a particle in them.
-// The walk itself is in composite.cpp.
+// Which walks half-angle slicing takes, and what light reaches a particle in them.
+// The walk itself is the reference's compositor.
 #include "tests/oracle/oracle.h"
 
-#include <algorithm>
-#include <limits>
 #include <memory>
-#include <numeric>
+#include <stop_token>
+#include <utility>
 
-#include <glm/exponential.hpp>
-#include <glm/geometric.hpp>
-
-#include "tests/oracle/composite.h"
+#include "renderer/reference/compositor.h"
+#include "renderer/reference/evaluator.h"
+#include "renderer/reference/eye.h"
+#include "renderer/reference/light_depth.h"
 #include "tests/oracle/half_angle.h"
-#include "tests/oracle/light_depth.h"
 
 namespace halflight::oracle {
 namespace {
 
-Rays RaysOf(const Light& light, const Scene& scene) {
-  if (const auto* sun = std::get_if<DirectionalLight>(&light.kind)) {
-    return Rays::Along(sun->direction);
-  }
-  const glm::dvec3& position = std::get<PointLight>(light.kind).position;
-  return Rays::From(scene.particles == nullptr ? position : position - scene.particles->origin);
-}
-
-glm::dvec3 Attenuate(const Light& light, double optical_depth) {
-  return glm::exp(-glm::dvec3(light.shadow_density) * optical_depth);
-}
+using reference::Cloud;
+using reference::LightDepth;
+using reference::Pass;
+using reference::Rays;
+using reference::RaysOf;
 
 std::vector<uint32_t> RanksOf(const std::vector<uint32_t>& order) {
   std::vector<uint32_t> ranks(order.size());
@@ -37,44 +29,29 @@ std::vector<uint32_t> RanksOf(const std::vector<uint32_t>& order) {
   return ranks;
 }
 
-// Particles by ascending value, ties by lower index.
-std::vector<uint32_t> OrderBy(const std::vector<double>& values) {
-  std::vector<uint32_t> order(values.size());
-  std::iota(order.begin(), order.end(), 0U);
-  std::stable_sort(order.begin(), order.end(),
-                   [&values](uint32_t a, uint32_t b) { return values[a] < values[b]; });
-  return order;
-}
-
-Transmittance ExactTransmittance(const Light& light, const Rays& rays, const Cloud& cloud) {
-  std::vector<double> depths;
-  for (const Particle& particle : cloud.particles) depths.push_back(rays.DepthOf(particle.center));
-  const auto buffer = std::make_shared<LightDepth>(rays, cloud, OrderBy(depths));
-  const auto ranks = std::make_shared<std::vector<uint32_t>>(RanksOf(buffer->order()));
-  return [light, buffer, ranks](const glm::dvec3& x, uint32_t particle) {
-    const uint32_t rank = (*ranks)[particle];
-    return Attenuate(light, buffer->At(x, rank, rank, rank).before);
-  };
-}
-
-Transmittance SlicedTransmittance(const Light& light, const Rays& rays, const Cloud& cloud,
-                                  const HalfAngleOrder& order, bool interpolate) {
-  const auto buffer = std::make_shared<LightDepth>(rays, cloud, order.order);
-  const auto ranks = std::make_shared<std::vector<uint32_t>>(RanksOf(order.order));
-  return [=, places = order.places](const glm::dvec3& x, uint32_t particle) {
-    const uint32_t rank = (*ranks)[particle];
+// Of the slices before a particle's own, and when interpolated its share of its own slice, itself
+// left out.
+reference::DepthFromLight SlicedDepth(const Rays& rays, const Cloud& cloud,
+                                      const HalfAngleOrder& order, bool interpolate) {
+  const auto buffer =
+      std::make_shared<const LightDepth>(rays, cloud, order.order, std::stop_token());
+  return [buffer, interpolate, places = order.places](const glm::dvec3& x, uint32_t particle,
+                                                      double enough) {
+    const uint32_t rank = buffer->ranks()[particle];
     const SlicePlace& place = places[rank];
-    const LightDepth::Sums sums =
-        buffer->At(x, place.begin, interpolate ? place.end : place.begin, rank);
-    return Attenuate(light, sums.before + place.fraction * sums.within);
+    const double before = buffer->Between(x, 0, place.begin, enough);
+    if (!interpolate || before > enough || place.fraction == 0.0) return before;
+    return before + place.fraction * (buffer->Between(x, place.begin, rank) +
+                                      buffer->Between(x, rank + 1, place.end));
   };
 }
 
 // The walk for one light that casts shadows.
-Pass HalfAnglePass(const Light& light, const Scene& scene, const Cloud& cloud) {
+Pass HalfAnglePass(size_t index, const Scene& scene, const Cloud& cloud) {
+  const Light& light = scene.lights[index];
   const Rays rays = RaysOf(light, scene);
   const HalfAngleOrder order =
-      OrderByHalfAngle(cloud, rays, ViewDirection(scene.camera), scene.shadow);
+      OrderByHalfAngle(cloud, rays, reference::Eye(scene).forward(), scene.shadow);
   Pass pass;
   pass.nearness = RanksOf(order.order);
   if (order.back_to_front) {
@@ -82,61 +59,80 @@ Pass HalfAnglePass(const Light& light, const Scene& scene, const Cloud& cloud) {
       rank = static_cast<uint32_t>(order.order.size()) - 1 - rank;
   }
   pass.lights.push_back(
-      {light, rays, SlicedTransmittance(light, rays, cloud, order, scene.shadow.interpolate)});
+      {index, light, rays, SlicedDepth(rays, cloud, order, scene.shadow.interpolate)});
   return pass;
 }
 
 // The walk of a scene without shadows.
 Pass CenterDistancePass(const Scene& scene, const Cloud& cloud) {
-  const glm::dvec3 eye = EyePosition(scene);
-  const bool flat = std::holds_alternative<Orthographic>(scene.camera.projection);
-  const Rays rays = flat ? Rays::Along(ViewDirection(scene.camera)) : Rays::From(eye);
-  std::vector<double> distances;
-  for (const Particle& particle : cloud.particles) {
-    distances.push_back(rays.DepthOf(particle.center));
-  }
   Pass pass;
-  pass.nearness = RanksOf(OrderBy(distances));
+  pass.nearness = RanksOf(reference::OrderFromLight(reference::Eye(scene).rays(), cloud, {}));
   return pass;
+}
+
+std::vector<glm::ivec2> PixelsOf(const Scene& scene, const OracleOptions& options) {
+  std::vector<glm::ivec2> pixels;
+  for (int y = options.stride / 2; y < scene.camera.window.height; y += options.stride) {
+    for (int x = options.stride / 2; x < scene.camera.window.width; x += options.stride) {
+      pixels.emplace_back(x, y);
+    }
+  }
+  return pixels;
+}
+
+OracleImage ImageOf(const Scene& scene, std::vector<glm::ivec2> pixels,
+                    reference::PixelValues values) {
+  return {.width = scene.camera.window.width,
+          .height = scene.camera.window.height,
+          .pixels = std::move(pixels),
+          .rgba = std::move(values.rgba),
+          .depth = std::move(values.depth),
+          .transmittance = std::move(values.transmittance)};
+}
+
+OracleImage Composite(const Scene& scene, const Cloud& cloud, std::vector<Pass> passes,
+                      const OracleOptions& options) {
+  const reference::Compositor compositor(scene, cloud, reference::IndexedEye(scene, cloud, {}),
+                                         std::move(passes));
+  std::vector<glm::ivec2> pixels = PixelsOf(scene, options);
+  // Without a stop, nothing can fail.
+  reference::PixelValues values =
+      *reference::EvaluatePixels(compositor, pixels, {.threads = options.threads});
+  return ImageOf(scene, std::move(pixels), std::move(values));
 }
 
 }  // namespace
 
 OracleImage RenderUnshadowed(const Scene& scene, const OracleOptions& options) {
-  const Cloud cloud = ResolveCloud(scene);
-  Pass pass{.nearness = {}, .ambient_and_emission = true, .lights = {}};
-  for (const Light& light : scene.lights) {
-    pass.lights.push_back({light, RaysOf(light, scene), nullptr});
-  }
-  return Composite(scene, cloud, {pass}, options);
+  Scene open = scene;
+  for (Light& light : open.lights) light.shadow_density = glm::vec3(0.0F);
+  return RenderExact(open, options);
 }
 
 OracleImage RenderExact(const Scene& scene, const OracleOptions& options) {
-  const Cloud cloud = ResolveCloud(scene);
-  Pass pass{.nearness = {}, .ambient_and_emission = true, .lights = {}};
-  for (const Light& light : scene.lights) {
-    const Rays rays = RaysOf(light, scene);
-    pass.lights.push_back(
-        {light, rays,
-         light.casts_shadows() ? ExactTransmittance(light, rays, cloud) : Transmittance()});
-  }
-  return Composite(scene, cloud, {pass}, options);
+  std::vector<glm::ivec2> pixels = PixelsOf(scene, options);
+  reference::PixelValues values =
+      *(*reference::Evaluator::Create(scene))->Evaluate(pixels, {.threads = options.threads});
+  return ImageOf(scene, std::move(pixels), std::move(values));
 }
 
 OracleImage RenderHalfAngle(const Scene& scene, const OracleOptions& options) {
-  const Cloud cloud = ResolveCloud(scene);
+  const Cloud cloud = reference::ResolveCloud(scene);
   std::vector<Pass> passes;
-  for (const Light& light : scene.lights) {
-    if (light.casts_shadows()) passes.push_back(HalfAnglePass(light, scene, cloud));
+  for (size_t light = 0; light < scene.lights.size(); ++light) {
+    if (scene.lights[light].casts_shadows()) {
+      passes.push_back(HalfAnglePass(light, scene, cloud));
+    }
   }
   if (passes.empty()) passes.push_back(CenterDistancePass(scene, cloud));
   passes.front().ambient_and_emission = true;
-  for (const Light& light : scene.lights) {
+  for (size_t index = 0; index < scene.lights.size(); ++index) {
+    const Light& light = scene.lights[index];
     if (!light.casts_shadows()) {
-      passes.front().lights.push_back({light, RaysOf(light, scene), nullptr});
+      passes.front().lights.push_back({index, light, RaysOf(light, scene), nullptr});
     }
   }
-  return Composite(scene, cloud, passes, options);
+  return Composite(scene, cloud, std::move(passes), options);
 }
 
 }  // namespace halflight::oracle

@@ -1,6 +1,6 @@
-// An independent evaluation of the image model on the CPU, in float64, to judge renderers by.
-// Written from the model's definition alone, without any of the renderer's code. Leaves out what
-// is an approximation by intent: blur, and images composited at a lower resolution.
+// Half-angle slicing evaluated on the CPU in float64, beside the image model itself, to judge
+// renderers by. Written from the definitions alone, without any of the GL path's code. Leaves out
+// what is an approximation by intent: blur, and images composited at a lower resolution.
 #pragma once
 
 #include <vector>
@@ -24,11 +24,8 @@ struct OracleImage {
   int height = 0;
   std::vector<glm::ivec2> pixels;  // places in the window, row by row from the top
   std::vector<glm::dvec4> rgba;    // premultiplied
-  // Coverage-weighted means: of the depth of x_i along the camera's axis (infinity where nothing is
-  // covered), and of the transmittance, at x_i, of the first light that casts shadows (1 where
-  // nothing is covered, or no light casts any).
-  std::vector<double> depth;
-  std::vector<glm::dvec3> transmittance;
+  std::vector<double> depth;       // as reference::PixelValues
+  std::vector<std::vector<glm::dvec3>> transmittance;  // by light
 };
 
 // The model without shadows: all light arrives, particles in the order of the distance of x_i.

@@ -57,8 +57,8 @@ TEST(Options, HelpNamesEveryFlagAndRunsNothing) {
   for (const char* flag :
        {"--address", "--device", "--log-level", "--encode-threads", "--drain-seconds", "--version",
         "--max-particles", "--max-particle-bytes", "--max-cache-bytes", "--max-image-size",
-        "--max-light-buffer-size", "--max-slices", "--max-lights", "--max-outputs",
-        "--max-output-bytes", "--max-queued-frames", "--max-message-bytes"}) {
+        "--max-reference-work", "--max-light-buffer-size", "--max-slices", "--max-lights",
+        "--max-outputs", "--max-output-bytes", "--max-queued-frames", "--max-message-bytes"}) {
     EXPECT_THAT(out.str(), HasSubstr(flag));
   }
 }

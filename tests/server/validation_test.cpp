@@ -75,6 +75,7 @@ TEST_P(Validation, RefusesAndNamesFieldAndValue) {
   limits.max_lights = 2;
   limits.max_outputs = 3;
   limits.max_output_bytes = 64 * kMiB;
+  limits.max_reference_work = 1000;
   const auto job = ConvertRequest(request, store, limits);
   ASSERT_FALSE(job.ok());
   EXPECT_EQ(job.status().code(), absl::StatusCode::kInvalidArgument);
@@ -247,7 +248,11 @@ INSTANTIATE_TEST_SUITE_P(
                 "scene.time_offset_s: nan"},
         Refusal{"TechniqueUnknown",
                 [](Request& r) { ShadowOf(r).set_technique(static_cast<v1::ShadowTechnique>(99)); },
-                "scene.shadow.technique: 99, allowed: SHADOW_TECHNIQUE_HALF_ANGLE"},
+                "scene.shadow.technique: 99, allowed: SHADOW_TECHNIQUE_HALF_ANGLE, "
+                "SHADOW_TECHNIQUE_REFERENCE"},
+        Refusal{"ReferenceOfTooMuch",
+                [](Request& r) { ShadowOf(r).set_technique(v1::SHADOW_TECHNIQUE_REFERENCE); },
+                "scene.shadow.technique: SHADOW_TECHNIQUE_REFERENCE of "},
         Refusal{"SpacingUnknown",
                 [](Request& r) { ShadowOf(r).set_spacing(static_cast<v1::SliceSpacing>(-1)); },
                 "scene.shadow.spacing: -1"},

@@ -8,7 +8,7 @@
 
 #include "renderer/scene.h"
 
-namespace halflight::oracle {
+namespace halflight::reference {
 
 struct Particle {
   glm::dvec3 center;  // from the set's origin, at the scene's time
@@ -29,4 +29,4 @@ Cloud ResolveCloud(const Scene& scene);
 // The optical depth of a particle at impact parameter b, given b squared.
 double OpticalDepthAt(const Particle& particle, Profile profile, double squared_impact);
 
-}  // namespace halflight::oracle
+}  // namespace halflight::reference

@@ -1,17 +1,21 @@
 // The formulas for one particle, from the image model; see cloud.h.
-#include "tests/oracle/cloud.h"
+#include "renderer/reference/cloud.h"
 
 #include <algorithm>
 #include <cmath>
 
 #include <glm/common.hpp>
 
-namespace halflight::oracle {
+namespace halflight::reference {
 namespace {
 
 template <typename T>
 T ValueOr(const std::vector<T>& values, size_t index, const T& otherwise) {
   return values.empty() ? otherwise : values[index];
+}
+
+double CentralDepth(float opacity) {
+  return -std::log1p(-static_cast<double>(std::min(opacity, kMaxOpacity)));
 }
 
 }  // namespace
@@ -22,13 +26,14 @@ Cloud ResolveCloud(const Scene& scene) {
   if (scene.particles == nullptr) return cloud;
   const ParticleSet& set = *scene.particles;
   const Material& material = scene.material;
+  const double uniform_depth = CentralDepth(material.opacity);
+  cloud.particles.reserve(set.size());
   for (size_t i = 0; i < set.size(); ++i) {
-    const double opacity = std::min(ValueOr(set.opacities, i, material.opacity), kMaxOpacity);
     const glm::dvec3 velocity(ValueOr(set.velocities, i, glm::vec3(0.0F)));
     cloud.particles.push_back(
         {.center = glm::dvec3(set.positions[i]) + scene.time_offset_s * velocity,
          .radius = ValueOr(set.radii, i, material.radius),
-         .optical_depth = -std::log1p(-opacity),
+         .optical_depth = set.opacities.empty() ? uniform_depth : CentralDepth(set.opacities[i]),
          .color = glm::dvec3(ValueOr(set.colors, i, glm::vec3(1.0F))) * glm::dvec3(material.albedo),
          .emission = glm::dvec3(ValueOr(set.emissions, i, material.emission))});
   }
@@ -49,4 +54,4 @@ double OpticalDepthAt(const Particle& particle, Profile profile, double squared_
   return particle.optical_depth * (profile == Profile::kSoft ? remaining : std::sqrt(remaining));
 }
 
-}  // namespace halflight::oracle
+}  // namespace halflight::reference

@@ -1,4 +1,4 @@
-// Small scenes whose rays are known, for the tests of the oracle.
+// Small scenes whose rays are known, for the tests of the reference.
 // Holds no expected images.
 #pragma once
 
@@ -14,7 +14,7 @@
 
 #include "renderer/scene.h"
 
-namespace halflight::oracle {
+namespace halflight::reference {
 
 // A square image of odd size, whose middle pixel looks along world -z from (0, 0, 10).
 inline Scene EmptyScene(int size = 33) {
@@ -72,4 +72,4 @@ inline void ExpectNear(const glm::dvec4& value, const glm::dvec4& expected,
   for (int i = 0; i < 4; ++i) EXPECT_NEAR(value[i], expected[i], tolerance) << "channel " << i;
 }
 
-}  // namespace halflight::oracle
+}  // namespace halflight::reference

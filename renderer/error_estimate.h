@@ -1,0 +1,77 @@
+// How far a frame is from the image model, from the model's values at a few hundred random pixels.
+// No GL. The model has no scattering: of a scene that has it, hand in the frame without, and say
+// that this is what was compared.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <span>
+#include <stop_token>
+#include <vector>
+
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
+#include <glm/vec4.hpp>
+
+#include "absl/status/statusor.h"
+#include "renderer/image.h"
+#include "renderer/scene.h"
+
+namespace halflight {
+
+struct ErrorEstimateOptions {
+  // Pixels at which the model is evaluated: at least 32, taken as even. With the default intervals
+  // were found to hold 93 to 97 % of the time (tests/reference/error_estimate_test.cpp). With fewer
+  // they hold less often where errors are few and large: with 512 about 90 % of the time for frames
+  // within 2 % of the model.
+  int samples = 1024;
+  uint64_t seed = 1;  // the same seed takes the same pixels of the same frame
+};
+
+// A figure, and the interval that contains the truth 95 % of the time.
+struct EstimatedFigure {
+  double value = 0.0;
+  double low = 0.0;
+  double high = 0.0;
+};
+
+struct PixelError {
+  glm::ivec2 pixel{0};    // in the image
+  glm::dvec3 error{0.0};  // R, G and B of frame minus reference
+  double largest = 0.0;   // of their absolute values
+};
+
+// Over R, G and B, premultiplied and linear, of the pixels that the frame covers by more than 0.01.
+struct ErrorEstimate {
+  size_t covered_pixels = 0;
+  size_t sampled_pixels = 0;          // all of the covered ones where these are few
+  EstimatedFigure mean_square_error;  // unbiased, as is the next
+  EstimatedFigure bias;               // mean of frame minus reference
+  EstimatedFigure rmse;
+  EstimatedFigure relative_rmse;  // to the mean of the reference over the same pixels
+  double reference_mean = 0.0;    // an estimate too, and unbiased
+  // Of the sample alone, not of the image: the 99.9th percentile and the largest of the absolute
+  // errors of a channel, and the pixels where they are largest, worst first.
+  double sample_p999 = 0.0;
+  double sample_max = 0.0;
+  std::vector<PixelError> sample_worst;
+  double milliseconds = 0.0;
+};
+
+// R G B A of the model at pixels of the image, one for each.
+using ReferenceAt =
+    std::function<absl::StatusOr<std::vector<glm::dvec4>>(std::span<const glm::ivec2> pixels)>;
+
+// `beauty` is R G B A, premultiplied. InvalidArgument for options out of range, else the errors of
+// `reference`.
+absl::StatusOr<ErrorEstimate> EstimateError(const Image& beauty, const ReferenceAt& reference,
+                                            const ErrorEstimateOptions& options = {});
+
+// Against the scene's own model, evaluated on all cores; `beauty` is the scene's camera window.
+// Cancelled soon after `stop` was requested.
+absl::StatusOr<ErrorEstimate> EstimateError(const Image& beauty, const Scene& scene,
+                                            const ErrorEstimateOptions& options = {},
+                                            const std::stop_token& stop = {});
+
+}  // namespace halflight
