@@ -56,9 +56,10 @@ absl::Status RenderThread::Start(const std::string& device) {
   std::promise<absl::StatusOr<DeviceInfo>> promise;
   std::future<absl::StatusOr<DeviceInfo>> started = promise.get_future();
   thread_ = std::thread(&RenderThread::Run, this, device, std::move(promise));
-  absl::StatusOr<DeviceInfo> info = started.get();
-  if (info.ok()) device_ = *std::move(info);
-  return info.status();
+  const absl::StatusOr<DeviceInfo> info = started.get();
+  if (!info.ok()) return info.status();
+  device_ = *info;
+  return absl::OkStatus();
 }
 
 RenderThread::~RenderThread() {

@@ -222,7 +222,7 @@ absl::StatusOr<std::unique_ptr<EglContext>> EglContext::Create(const std::string
   for (const Candidate& candidate : candidates) {
     auto handles = std::make_unique<Handles>();
     if (const absl::Status opened = handles->Open(candidate); !opened.ok()) {
-      absl::StrAppend(&refusals, "; ", std::string(opened.message()));
+      absl::StrAppend(&refusals, "; ", opened.message());
       continue;
     }
     if (choice->kind == DeviceChoice::Kind::kUuid && CurrentDeviceUuid() != choice->value) continue;

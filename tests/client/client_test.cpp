@@ -174,6 +174,8 @@ TEST(Client, ConnectsAgainToAServerThatComesLate) {
   ClientOptions options;
   options.max_attempts = 100;
   options.first_backoff = std::chrono::milliseconds(10);
+  // gRPC by itself looks after an idle channel every 5 s only.
+  options.timeout = std::chrono::seconds(4);
   Client client = *Client::Connect(address, options);
   EXPECT_FALSE(client.WaitForConnection(std::chrono::milliseconds(10)));
   std::unique_ptr<FakeService> service;
@@ -181,10 +183,7 @@ TEST(Client, ConnectsAgainToAServerThatComesLate) {
     std::this_thread::sleep_for(std::chrono::milliseconds(200));
     service = std::make_unique<FakeService>(address);
   });
-  const auto start = std::chrono::steady_clock::now();
   EXPECT_TRUE(client.GetServerInfo().ok());
-  // gRPC by itself looks after an idle channel every 5 s only.
-  EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(3));
 }
 
 TEST_F(ClientTest, EndsAtItsDeadline) {
@@ -192,9 +191,8 @@ TEST_F(ClientTest, EndsAtItsDeadline) {
   ClientOptions options;
   options.max_attempts = 1000;
   options.timeout = std::chrono::milliseconds(200);
-  const auto start = std::chrono::steady_clock::now();
   EXPECT_FALSE(Connect(options).GetServerInfo().ok());
-  EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(5));
+  EXPECT_LT(service_.Calls("GetServerInfo"), 1000);
 }
 
 TEST_F(ClientTest, SaysWhichTimeWasTooShort) {

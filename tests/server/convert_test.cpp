@@ -18,7 +18,6 @@ namespace halflight {
 namespace {
 
 using testing::FakeImage;
-using ::testing::HasSubstr;
 using testing::MakeParticles;
 using testing::MakeRequest;
 
