@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "absl/strings/str_cat.h"
 #include "renderer/frame.h"
 #include "renderer/reference_frame.h"
 #include "renderer/shadow_technique.h"
@@ -51,6 +52,10 @@ void DescribePasses(const Scene& scene, FramePlan& plan) {
 absl::StatusOr<FramePlan> PlanFrame(const FrameRequest& request, const ParticleView& particles) {
   const Scene& scene = request.scene;
   if (scene.shadow.technique == ShadowTechniqueKind::kReference) return PlanReferenceFrame(request);
+  if (scene.lights.size() > kMaxLights) {
+    return absl::InvalidArgumentError(absl::StrCat("lighting.lights: ", scene.lights.size(),
+                                                   " lights, allowed: at most ", kMaxLights));
+  }
   FramePlan plan;
   plan.window_size = {scene.camera.window.width, scene.camera.window.height};
   plan.composite_size = CompositeSize(scene.camera.window, scene.sampling);

@@ -18,6 +18,9 @@ namespace halflight {
 // Opacities above this are drawn as this, since the optical depth of 1 is infinite.
 inline constexpr float kMaxOpacity = 1.0F - 0x1p-20F;
 
+// Lights of a scene, at most.
+inline constexpr int kMaxLights = 16;
+
 // A particle cloud. Every attribute but the position may be empty, which means that the material's
 // value serves for all particles; otherwise it has as many elements as positions.
 struct ParticleSet {

@@ -12,6 +12,7 @@
 #include <CLI/CLI.hpp>
 
 #include "absl/strings/numbers.h"
+#include "renderer/scene.h"
 #include "server/convert/field_checks.h"
 #include "server/version.h"
 
@@ -119,7 +120,7 @@ absl::Status Check(const Options& options) {
                  {.low = static_cast<double>(kMinLightBufferSize), .high = 32768.0});
   checks.InRange("--max-particles", limits.max_particles, {.low = 1.0, .high = 0x1p31 - 1.0});
   checks.InRange("--max-slices", limits.max_slices, {.low = 1.0, .high = 0x1p31 - 1.0});
-  checks.InRange("--max-lights", limits.max_lights, {.low = 0.0, .high = 1024.0});
+  checks.InRange("--max-lights", limits.max_lights, {.low = 0.0, .high = kMaxLights});
   checks.InRange("--max-outputs", limits.max_outputs, {.low = 1.0, .high = 1024.0});
   checks.InRange("--max-output-bytes", limits.max_output_bytes, {.low = 1.0});
   checks.InRange("--max-queued-frames", limits.max_queued_frames, {.low = 1.0, .high = 65536.0});

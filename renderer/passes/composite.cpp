@@ -13,6 +13,8 @@ namespace halflight {
 
 namespace {
 
+static_assert(kMaxLights <= shader::kMaxLightsInTraversal);
+
 const gl::ProgramSource& CompositeProgram() {
   static const gl::ProgramSource source{
       "composite",

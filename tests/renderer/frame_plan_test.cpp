@@ -107,6 +107,16 @@ TEST(PlanFrame, NeverPlansMoreSlicesThanParticles) {
   EXPECT_EQ(Plan(request).traversals[0].slices, 5);
 }
 
+TEST(PlanFrame, RefusesMoreLightsThanTheShaderHoldsByName) {
+  FrameRequest request = test::Beauty(test::BallScene(5));
+  request.scene.lights.assign(kMaxLights, test::Sun({0, -1, 0}, 0.0F));
+  EXPECT_TRUE(PlanFrame(request, ParticleView(request.scene)).ok());
+  request.scene.lights.push_back(test::Sun({0, -1, 0}));
+  const auto plan = PlanFrame(request, ParticleView(request.scene));
+  EXPECT_EQ(plan.status().code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_THAT(std::string(plan.status().message()), HasSubstr("lighting.lights: 17 lights"));
+}
+
 TEST(HalfAngleAxis, LiesBetweenViewAndLightAndIsDrawnFrontToBackWhenTheyAgree) {
   const HalfAngleAxis axis = ComputeHalfAngleAxis({0, 0, -1}, {1, 0, 0.001});
   EXPECT_TRUE(axis.back_to_front);
