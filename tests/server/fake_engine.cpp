@@ -163,4 +163,14 @@ bool WaitFor(const std::function<bool()>& ready) {
   return true;
 }
 
+absl::StatusOr<EncodedImage> EncodePlain(const Image& image, ImageKind /*kind*/,
+                                         LightQuantity /*quantity*/,
+                                         const EncodeSettings& /*settings*/,
+                                         const ImageMetadata& /*metadata*/) {
+  EncodedImage encoded{.bytes = {}, .media_type = "test/plain", .white_black = {}};
+  encoded.bytes.assign(reinterpret_cast<const char*>(image.pixels.data()),
+                       image.pixels.size() * sizeof(float));
+  return encoded;
+}
+
 }  // namespace halflight::testing

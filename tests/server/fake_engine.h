@@ -12,6 +12,7 @@
 
 #include "halflight/v1/service.pb.h"
 #include "renderer/frame_engine.h"
+#include "server/encode/encode.h"
 
 namespace halflight::testing {
 
@@ -73,5 +74,10 @@ v1::RenderFrameRequest MakeRequest();
 
 // Until `ready` holds, 10 s at most; whether it does.
 bool WaitFor(const std::function<bool()>& ready);
+
+// Stands in for EncodeImage: the image's floats as they lie in memory.
+absl::StatusOr<EncodedImage> EncodePlain(const Image& image, ImageKind kind, LightQuantity quantity,
+                                         const EncodeSettings& settings,
+                                         const ImageMetadata& metadata);
 
 }  // namespace halflight::testing

@@ -17,6 +17,7 @@
 namespace halflight {
 namespace {
 
+using testing::EncodePlain;
 using testing::FakeEngine;
 using testing::FakeImage;
 using ::testing::HasSubstr;
@@ -28,17 +29,6 @@ using Result = absl::StatusOr<std::shared_ptr<const EncodedFrame>>;
 FrameJob MakeJob(const v1::RenderFrameRequest& request = MakeRequest()) {
   ParticleStore store(1 << 20);
   return *ConvertRequest(request, store, ServerLimits{});
-}
-
-// The image's floats as they lie in memory.
-absl::StatusOr<EncodedImage> EncodePlain(const Image& image, ImageKind /*kind*/,
-                                         LightQuantity /*quantity*/,
-                                         const EncodeSettings& /*settings*/,
-                                         const ImageMetadata& /*metadata*/) {
-  EncodedImage encoded{.bytes = {}, .media_type = "test/plain", .white_black = {}};
-  encoded.bytes.assign(reinterpret_cast<const char*>(image.pixels.data()),
-                       image.pixels.size() * sizeof(float));
-  return encoded;
 }
 
 class Pipeline : public ::testing::Test {

@@ -20,21 +20,12 @@
 namespace halflight {
 namespace {
 
+using testing::EncodePlain;
 using testing::FakeEngine;
 using ::testing::HasSubstr;
 using testing::MakeParticles;
 using testing::MakeRequest;
 using testing::WaitFor;
-
-absl::StatusOr<EncodedImage> EncodePlain(const Image& image, ImageKind /*kind*/,
-                                         LightQuantity /*quantity*/,
-                                         const EncodeSettings& /*settings*/,
-                                         const ImageMetadata& /*metadata*/) {
-  EncodedImage encoded{.bytes = {}, .media_type = "test/plain", .white_black = {}};
-  encoded.bytes.assign(reinterpret_cast<const char*>(image.pixels.data()),
-                       image.pixels.size() * sizeof(float));
-  return encoded;
-}
 
 class Service : public ::testing::Test {
  protected:
