@@ -8,14 +8,23 @@
 
 #include "halflight/v1/service.pb.h"
 #include "tests/encode/decoded.h"
-#include "tests/loopback/process.h"
 #include "tests/loopback/test_server.h"
+#include "tests/process/process.h"
+#include "tests/process/wait_for.h"
 
 namespace halflight::loopback {
 namespace {
 
 namespace fs = std::filesystem;
+using testing::Contents;
+using testing::Ended;
+using testing::Folder;
 using ::testing::HasSubstr;
+using testing::PlumePath;
+using testing::Process;
+using testing::ProcessesWith;
+using testing::RunHalflight;
+using testing::WaitFor;
 
 // No server of `folder` runs any more, and its socket is gone.
 void ExpectNothingLeft(const Folder& folder) {

@@ -10,15 +10,20 @@
 #include <gtest/gtest.h>
 
 #include "client/client.h"
-#include "tests/loopback/process.h"
 #include "tests/loopback/test_server.h"
 #include "tests/loopback/wire_scene.h"
+#include "tests/process/process.h"
+#include "tests/process/wait_for.h"
 #include "tests/renderer/test_scene.h"
 
 namespace halflight::loopback {
 namespace {
 
+using testing::Folder;
 using ::testing::HasSubstr;
+using testing::PlumePath;
+using testing::Process;
+using testing::WaitFor;
 
 // A call of a service whose stubs are not built here: one message there, the first one back.
 std::string AskOnce(const std::string& address, const std::string& method,

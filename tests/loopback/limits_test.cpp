@@ -8,12 +8,14 @@
 
 #include "tests/loopback/test_server.h"
 #include "tests/loopback/wire_scene.h"
+#include "tests/process/wait_for.h"
 #include "tests/renderer/test_scene.h"
 
 namespace halflight::loopback {
 namespace {
 
 using absl::StatusCode;
+using testing::WaitFor;
 
 // Seconds of work on any CPU, in thousands of short passes.
 v1::RenderFrameRequest LongRequest() {

@@ -6,13 +6,19 @@
 #include <gtest/gtest.h>
 
 #include "tests/encode/decoded.h"
-#include "tests/loopback/process.h"
+#include "tests/process/process.h"
 
 namespace halflight::loopback {
 namespace {
 
 namespace fs = std::filesystem;
+using testing::Contents;
+using testing::Ended;
+using testing::Folder;
 using ::testing::HasSubstr;
+using testing::PlumePath;
+using testing::Process;
+using testing::RunHalflight;
 
 // Fixed settings, so that frames alone are made as those of a sequence.
 std::vector<std::string> Fixed(std::vector<std::string> arguments) {

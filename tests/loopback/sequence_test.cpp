@@ -8,12 +8,14 @@
 
 #include "tests/loopback/test_server.h"
 #include "tests/loopback/wire_scene.h"
+#include "tests/process/wait_for.h"
 #include "tests/renderer/test_scene.h"
 
 namespace halflight::loopback {
 namespace {
 
 using ::testing::StartsWith;
+using testing::WaitFor;
 
 // The camera goes round the cloud, which changes every other frame.
 Scene SceneOf(uint64_t index) {

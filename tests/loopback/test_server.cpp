@@ -92,15 +92,4 @@ grpc::Status Ask(v1::RenderService::Stub& stub, const v1::RenderFrameRequest& re
   return reader->Finish();
 }
 
-bool WaitFor(const std::function<bool()>& ready) {
-  const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(60);
-  while (!ready()) {
-    if (std::chrono::steady_clock::now() >= until) {
-      return false;
-    }
-    std::this_thread::sleep_for(std::chrono::milliseconds(1));
-  }
-  return true;
-}
-
 }  // namespace halflight::loopback

@@ -57,7 +57,4 @@ client::RenderedFrame MustRender(client::Client& client, const v1::RenderFrameRe
 // The whole answer to a bare call, without the client library.
 grpc::Status Ask(v1::RenderService::Stub& stub, const v1::RenderFrameRequest& request);
 
-// Until `ready` holds, 60 s at most; whether it does.
-bool WaitFor(const std::function<bool()>& ready);
-
 }  // namespace halflight::loopback

@@ -152,17 +152,6 @@ v1::RenderFrameRequest MakeRequest() {
   return request;
 }
 
-bool WaitFor(const std::function<bool()>& ready) {
-  const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(10);
-  while (!ready()) {
-    if (std::chrono::steady_clock::now() >= until) {
-      return false;
-    }
-    std::this_thread::sleep_for(std::chrono::milliseconds(1));
-  }
-  return true;
-}
-
 absl::StatusOr<EncodedImage> EncodePlain(const Image& image, ImageKind /*kind*/,
                                          LightQuantity /*quantity*/,
                                          const EncodeSettings& /*settings*/,

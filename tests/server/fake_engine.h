@@ -72,9 +72,6 @@ v1::InlineParticles MakeParticles(int count, const std::vector<v1::ParticleAttri
 // Two particles with a radius, a camera, one directional light with shadows, one beauty output.
 v1::RenderFrameRequest MakeRequest();
 
-// Until `ready` holds, 10 s at most; whether it does.
-bool WaitFor(const std::function<bool()>& ready);
-
 // Stands in for EncodeImage: the image's floats as they lie in memory.
 absl::StatusOr<EncodedImage> EncodePlain(const Image& image, ImageKind kind, LightQuantity quantity,
                                          const EncodeSettings& settings,

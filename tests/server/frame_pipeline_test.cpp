@@ -12,6 +12,7 @@
 #include "halflight/sha256.h"
 #include "server/frame_log.h"
 #include "server/retry_hint.h"
+#include "tests/process/wait_for.h"
 #include "tests/server/fake_engine.h"
 
 namespace halflight {

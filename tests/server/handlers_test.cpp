@@ -17,6 +17,7 @@
 #include "server/handlers/render_sequence.h"
 #include "server/handlers/upload_particles.h"
 #include "server/retry_hint.h"
+#include "tests/process/wait_for.h"
 #include "tests/server/fake_engine.h"
 
 namespace halflight {

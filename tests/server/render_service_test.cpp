@@ -15,6 +15,7 @@
 #include "halflight/particle_payload.h"
 #include "halflight/v1/service.grpc.pb.h"
 #include "server/grpc_server.h"
+#include "tests/process/wait_for.h"
 #include "tests/server/fake_engine.h"
 
 namespace halflight {

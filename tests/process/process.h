@@ -1,4 +1,4 @@
-// The two programs as processes, and what is left of them.
+// Programs of the build as processes, and what is left of them.
 #pragma once
 
 #include <filesystem>
@@ -7,7 +7,7 @@
 
 #include <sys/types.h>
 
-namespace halflight::loopback {
+namespace halflight::testing {
 
 // A new directory that goes with the object.
 class Folder {
@@ -66,4 +66,4 @@ std::string Contents(const std::string& path);
 // A frame of the plume that the tests carry.
 std::string PlumePath(const std::string& frame);
 
-}  // namespace halflight::loopback
+}  // namespace halflight::testing

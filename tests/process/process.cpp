@@ -1,4 +1,4 @@
-#include "tests/loopback/process.h"
+#include "tests/process/process.h"
 
 #include <fcntl.h>
 #include <sys/wait.h>
@@ -12,9 +12,9 @@
 
 #include <gtest/gtest.h>
 
-#include "tests/loopback/test_server.h"
+#include "tests/process/wait_for.h"
 
-namespace halflight::loopback {
+namespace halflight::testing {
 
 namespace fs = std::filesystem;
 
@@ -122,4 +122,4 @@ std::string PlumePath(const std::string& frame) {
   return std::string(HALFLIGHT_TEST_DATA) + "/plume/plume." + frame + ".ply";
 }
 
-}  // namespace halflight::loopback
+}  // namespace halflight::testing
