@@ -56,8 +56,9 @@ TargetSearch::Prospect TargetSearch::Look(const Settings& settings) const {
     // What the technique's last frame took more than expected, this one will too.
     for (const TargetAttempt& attempt : attempts_) {
       if (attempt.settings.shadow.technique != technique) continue;
-      prospect.time.value = costs_.Predict(features_, settings) * attempt.milliseconds /
-                            costs_.Predict(features_, attempt.settings);
+      prospect.time = {costs_.Predict(features_, settings) * attempt.milliseconds /
+                           costs_.Predict(features_, attempt.settings),
+                       kLeastDeviation};
     }
   }
   if (goal_.max_time_ms) prospect.in_time = ProbabilityWithin(prospect.time, *goal_.max_time_ms);
@@ -80,14 +81,16 @@ std::vector<TargetSearch::Prospect> TargetSearch::Prospects() const {
   return prospects;
 }
 
-// The smallest error among what will likely be in time; where nothing is, the fastest.
+// The smallest error among what will likely be in time; where nothing is, the likeliest; where
+// nothing can be, the fastest, once.
 std::optional<TargetSearch::Prospect> TargetSearch::ChooseForTime(
     const std::vector<Prospect>& prospects) const {
   const auto likeliest = SmallestBy(prospects, [](const Prospect& p) { return -p.in_time; });
-  if (likeliest->in_time < kHopeless && !attempts_.empty()) return std::nullopt;
-  if (likeliest->in_time < kLikely) {
+  if (likeliest->in_time < kHopeless) {
+    if (!attempts_.empty()) return std::nullopt;
     return *SmallestBy(prospects, [](const Prospect& p) { return p.time.value; });
   }
+  if (likeliest->in_time < kLikely) return *likeliest;
   const auto error = [&](const Prospect& p) {
     return p.in_time < kLikely ? std::numeric_limits<double>::infinity() : p.error.value;
   };
