@@ -85,6 +85,11 @@ Expected TargetKnowledge::Error(const SceneFeatures& features, const Settings& s
   return {std::sqrt(sum.Predict(terms)), std::max(kLeastErrorDeviation, 0.5 * sum.spread())};
 }
 
+bool TargetKnowledge::IsUntried(ShadowTechniqueKind kind) const {
+  const std::lock_guard lock(mutex_);
+  return has_frames_ && squared_errors_[static_cast<size_t>(kind)].observations() == 0.0;
+}
+
 std::optional<Expected> TargetKnowledge::Time(const Settings& settings) const {
   const std::lock_guard lock(mutex_);
   const Record* record = Find(settings);
@@ -114,6 +119,7 @@ void TargetKnowledge::LearnTime(const Settings& settings, double milliseconds) {
 
 void TargetKnowledge::AgeByOneFrame() {
   const std::lock_guard lock(mutex_);
+  has_frames_ = true;
   for (Record& record : records_) ++record.age;
   std::erase_if(records_, [](const Record& record) { return record.age > kOldestRecord; });
 }

@@ -32,6 +32,9 @@ class TargetKnowledge {
 
   // Relative RMSE: of the same settings on a frame before where there is one, else of the model.
   [[nodiscard]] Expected Error(const SceneFeatures& features, const Settings& settings) const;
+  // Whether frames were rendered, but none whose error was measured with this technique: a try is
+  // then worth more than this frame's time.
+  [[nodiscard]] bool IsUntried(ShadowTechniqueKind kind) const;
   // Milliseconds of the same settings on a frame before.
   [[nodiscard]] std::optional<Expected> Time(const Settings& settings) const;
 
@@ -55,6 +58,7 @@ class TargetKnowledge {
   mutable std::mutex mutex_;
   std::vector<LearnedSum> squared_errors_;  // by technique
   std::vector<Record> records_;
+  bool has_frames_ = false;
 
   bool leading_ = false;
   bool learned_ = false;

@@ -13,8 +13,9 @@ namespace halflight {
 
 namespace {
 
-constexpr double kHopeless = 0.02;  // probability below which a frame is not worth rendering
-constexpr double kLikely = 0.7;     // of staying within max_time_ms, to be chosen for its error
+constexpr double kHopeless = 0.02;      // probability below which a frame is not worth rendering
+constexpr double kLikely = 0.7;         // of staying within max_time_ms, to be chosen for its error
+constexpr double kWeightOfTries = 0.3;  // of a miss that a sequence learns from
 constexpr double kLeastDeviation = 0.1;  // of times, ln
 // With 1024 samples the upper end of an interval lies about so far above the figure, ln.
 constexpr double kHalfInterval = 0.06;
@@ -102,7 +103,8 @@ std::optional<TargetSearch::Prospect> TargetSearch::ChooseForTime(
 }
 
 // The least time until the target is met, on average: one's own, and where that misses, that of the
-// surest one. The last attempt is the surest one's.
+// surest one, which counts for less where the miss would tell later frames about a technique not
+// tried before. The last attempt is the surest one's.
 std::optional<TargetSearch::Prospect> TargetSearch::ChooseForError(
     const std::vector<Prospect>& prospects) const {
   const auto surest = SmallestBy(prospects, [](const Prospect& p) { return -p.in_both; });
@@ -115,7 +117,8 @@ std::optional<TargetSearch::Prospect> TargetSearch::ChooseForError(
   const double otherwise = surest->time.value + measurement;
   return *SmallestBy(prospects, [&](const Prospect& p) {
     if (p.in_both < kHopeless) return std::numeric_limits<double>::infinity();
-    return p.time.value + measurement + (1.0 - p.in_both) * otherwise;
+    const double weight = knowledge_.IsUntried(p.settings->shadow.technique) ? kWeightOfTries : 1.0;
+    return p.time.value + measurement + weight * (1.0 - p.in_both) * otherwise;
   });
 }
 

@@ -234,6 +234,30 @@ TEST(TargetSearch, StartsASecondFrameWithWhatTheFirstNeeded) {
   EXPECT_GE(once, static_cast<int>(kSeeds) * 85 / 100);
 }
 
+TEST(TargetSearch, TriesACheaperTechniqueOnALaterFrame) {
+  // Half-angle slicing is far better here than it mostly is, which the first frame cannot know.
+  Scene scene = test::BallScene(20000, 400);
+  scene.material.opacity = 0.2F;
+  CostModel costs;
+  TargetKnowledge knowledge;
+  TargetGoal goal;
+  goal.max_error = 0.12;
+  std::vector<ShadowTechniqueKind> returned;
+  for (int frame = 0; frame < 3; ++frame) {
+    TargetSearch search(scene, kBeauty, goal, {}, costs, knowledge);
+    while (const std::optional<TargetStep> step = search.Next()) {
+      const bool exact = step->settings.shadow.technique == ShadowTechniqueKind::kReference;
+      const double error = exact ? 1e-7 : 0.02;
+      search.Observe(
+          {exact ? 1300.0 : 300.0, EstimatedFigure{error, 0.95 * error, 1.05 * error}, 20.0});
+    }
+    EXPECT_TRUE(search.outcome().met);
+    returned.push_back(Returned(search.outcome()).settings.shadow.technique);
+  }
+  EXPECT_EQ(returned[0], ShadowTechniqueKind::kReference);
+  EXPECT_EQ(returned[2], ShadowTechniqueKind::kHalfAngle);
+}
+
 TEST(TargetSearch, IsDeterministic) {
   for (uint32_t seed = 1; seed <= 20; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
