@@ -144,7 +144,7 @@ bool TargetSearch::PaysToMeasureAgain(const std::optional<Prospect>& next) const
 std::optional<TargetStep> TargetSearch::Next() {
   if (pending_ || done_) return pending_;
   std::optional<Prospect> next;
-  if (attempts_.empty() || !attempts_[*returned()].met) {
+  if (attempts_.empty() || !attempts_[*BestOf(attempts_.size())].met) {
     next = Choose(Prospects());
     if (PaysToMeasureAgain(next)) {
       const TargetAttempt& last = attempts_.back();
@@ -207,13 +207,20 @@ bool TargetSearch::IsBetter(const TargetAttempt& a, const TargetAttempt& b) cons
   return a.relative_rmse->value < b.relative_rmse->value || std::isnan(b.relative_rmse->value);
 }
 
-std::optional<size_t> TargetSearch::returned() const {
-  if (attempts_.empty()) return std::nullopt;
+std::optional<size_t> TargetSearch::BestOf(size_t attempts) const {
+  if (attempts == 0) return std::nullopt;
   size_t best = 0;
-  for (size_t i = 1; i < attempts_.size(); ++i) {
+  for (size_t i = 1; i < attempts; ++i) {
     if (IsBetter(attempts_[i], attempts_[best])) best = i;
   }
   return best;
+}
+
+bool TargetSearch::Needs(size_t attempt) const {
+  if (attempt >= attempts_.size()) return false;
+  if (done_) return attempt == BestOf(attempts_.size());
+  // Measured again, the last one may turn out worse than the best before it.
+  return attempt + 1 == attempts_.size() || attempt == BestOf(attempts_.size() - 1);
 }
 
 std::string TargetSearch::WhyNotMet() const {
@@ -256,7 +263,7 @@ std::string TargetSearch::WhyNotMet() const {
 TargetOutcome TargetSearch::outcome() const {
   TargetOutcome outcome;
   outcome.attempts = attempts_;
-  outcome.returned = returned();
+  outcome.returned = BestOf(attempts_.size());
   outcome.met = outcome.returned && attempts_[*outcome.returned].met;
   if (!outcome.met) outcome.reason = WhyNotMet();
   return outcome;

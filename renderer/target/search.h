@@ -62,8 +62,9 @@ struct TargetOutcome {
 // the same time, and outlive this one. The same inputs and observations give the same steps.
 //
 //     while (const std::optional<TargetStep> step = search.Next()) {
-//       render or measure; keep the frame of this step and that of search.returned(), drop others
+//       render these settings, or measure the frame rendered last
 //       search.Observe(...);
+//       drop the frames of attempts that search.Needs no more
 //     }
 class TargetSearch {
  public:
@@ -80,9 +81,9 @@ class TargetSearch {
   // Of the step that Next returned last.
   void Observe(const TargetObservation& observation);
 
-  // Which attempt is returned if none better follows: the only one, besides the last rendered,
-  // whose frame is still needed.
-  [[nodiscard]] std::optional<size_t> returned() const;
+  // Whether the frame of an attempt, counted from 0, may still be measured or returned: that of two
+  // at most.
+  [[nodiscard]] bool Needs(size_t attempt) const;
 
   // Valid after Next returned none.
   [[nodiscard]] TargetOutcome outcome() const;
@@ -107,6 +108,8 @@ class TargetSearch {
   [[nodiscard]] bool Meets(const TargetAttempt& attempt) const;
   [[nodiscard]] bool IsInTime(const TargetAttempt& attempt) const;
   [[nodiscard]] bool IsBetter(const TargetAttempt& a, const TargetAttempt& b) const;
+  // Of the first so many attempts.
+  [[nodiscard]] std::optional<size_t> BestOf(size_t attempts) const;
   [[nodiscard]] std::string WhyNotMet() const;
 
   TargetGoal goal_;

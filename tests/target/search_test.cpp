@@ -309,7 +309,6 @@ TEST(TargetSearch, RepeatsAStepUntilItWasObserved) {
   TargetGoal goal;
   goal.max_time_ms = 1e6;
   TargetSearch search(scene, kBeauty, goal, {}, costs, knowledge);
-  EXPECT_FALSE(search.returned());
   EXPECT_EQ(search.Next()->settings, search.Next()->settings);
   EXPECT_EQ(search.Next()->samples, 0);
   search.Observe({10.0, std::nullopt, 0.0});

@@ -32,12 +32,10 @@ struct Reached {
 
 class PlumeTarget : public test::GlTest {
  protected:
-  // As a service does it: keeps the frame rendered last and the one to be returned.
   Reached Reach(const Scene& scene, const TargetGoal& goal, const TargetLimits& limits) {
     const std::vector<ImageRequest> images = {{ImageKind::kBeauty}};
     TargetSearch search(scene, images, goal, limits, costs_, knowledge_);
-    Reached reached;
-    Image last;
+    std::vector<Image> frames;
     while (const std::optional<TargetStep> step = search.Next()) {
       TargetObservation observation;
       Scene tried = scene;
@@ -48,20 +46,22 @@ class PlumeTarget : public test::GlTest {
         for (const StageTiming& timing : frame.timings) {
           observation.milliseconds += timing.milliseconds;
         }
-        last = std::move(frame.images.at(0));
+        frames.push_back(std::move(frame.images.at(0)));
       }
       if (step->samples > 0) {
-        const auto error = EstimateError(last, scene, {.samples = step->samples, .seed = 1});
+        const auto error =
+            EstimateError(frames.back(), scene, {.samples = step->samples, .seed = 1});
         EXPECT_TRUE(error.ok()) << error.status();
         observation.relative_rmse = error->relative_rmse;
         observation.measurement_ms = error->milliseconds;
       }
       search.Observe(observation);
-      const bool is_last = search.returned() == search.outcome().attempts.size() - 1;
-      if (is_last) reached.beauty = last;
+      for (size_t i = 0; i < frames.size(); ++i) {
+        if (!search.Needs(i)) frames[i] = {};
+      }
     }
-    reached.outcome = search.outcome();
-    return reached;
+    const TargetOutcome outcome = search.outcome();
+    return {outcome, frames.at(outcome.returned.value())};
   }
 
   CostModel costs_;

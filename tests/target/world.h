@@ -7,6 +7,8 @@
 #include <random>
 #include <vector>
 
+#include <gtest/gtest.h>
+
 #include "renderer/target/search.h"
 #include "tests/renderer/test_scene.h"
 
@@ -112,12 +114,22 @@ class World {
   std::vector<std::vector<double>> parts_;
 };
 
-// Runs a search to its end.
+// Runs a search to its end, and keeps frames as it says.
 inline TargetOutcome Run(TargetSearch& search, const World& world) {
+  std::vector<bool> kept;
   while (const std::optional<TargetStep> step = search.Next()) {
+    if (step->action == TargetAction::kRender) {
+      kept.push_back(true);
+    } else {
+      EXPECT_TRUE(kept.back());
+    }
     search.Observe(world.Observe(*step));
+    for (size_t i = 0; i < kept.size(); ++i) kept[i] = kept[i] && search.Needs(i);
   }
-  return search.outcome();
+  const TargetOutcome outcome = search.outcome();
+  EXPECT_TRUE(outcome.returned && kept.at(*outcome.returned));
+  EXPECT_LE(std::count(kept.begin(), kept.end(), true), 2);
+  return outcome;
 }
 
 }  // namespace halflight::test
