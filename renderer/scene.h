@@ -3,6 +3,7 @@
 // valid: whoever fills these structs has checked them (the service does so in server/convert).
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -124,6 +125,15 @@ struct Scene {
   Material material;
   ShadowSettings shadow;
   Sampling sampling;
+
+  // Whether light spreads sideways where it shows: in shadows.
+  [[nodiscard]] bool scatters() const {
+    const bool spreads = shadow.blur_mode == BlurMode::kTexelsPerSlice
+                             ? shadow.blur_texels > 0.0F
+                             : material.scattering_spread > 0.0F;
+    return spreads && std::any_of(lights.begin(), lights.end(),
+                                  [](const Light& light) { return light.casts_shadows(); });
+  }
 };
 
 }  // namespace halflight
