@@ -22,6 +22,8 @@
 namespace halflight {
 namespace {
 
+using reference::BeautyOf;
+
 struct FrameCase {
   const char* name;
   const char* frame;
@@ -49,14 +51,6 @@ Scene SceneOf(const FrameCase& frame) {
   light.kind = DirectionalLight{glm::normalize(frame.light)};
   scene.lights = {light};
   return scene;
-}
-
-Image BeautyOf(const std::vector<glm::dvec4>& rgba, int width) {
-  Image image{width, static_cast<int>(rgba.size()) / width, 1, {"R", "G", "B", "A"}, {}};
-  for (const glm::dvec4& pixel : rgba) {
-    for (int c = 0; c < 4; ++c) image.pixels.push_back(static_cast<float>(pixel[c]));
-  }
-  return image;
 }
 
 // A frame and the whole truth about it.
@@ -273,54 +267,6 @@ TEST(ErrorEstimate, OfABlackModelIsInfiniteAndOfAFrameThatIsNotFiniteToo) {
     EXPECT_FALSE(estimate.relative_rmse.high <= 1.0) << "it must not pass for a good frame";
     EXPECT_EQ(estimate.sample_max, HUGE_VAL);
   }
-}
-
-TEST(ErrorMap, IsFrameMinusModelAndSaysWhatAllSamplesSay) {
-  Scene scene = reference::RandomScene(60, 300);  // more pixels than are done at a time
-  scene.lights.resize(1);
-  const auto exact = (*reference::Evaluator::Create(scene))->EvaluateWindow();
-  Image beauty = BeautyOf(exact->rgba, 300);
-  for (size_t i = 0; i < beauty.pixels.size(); ++i) {
-    if (i % 4 != 3) beauty.pixels[i] += 1e-3F * static_cast<float>(i % 17) - 5e-3F;
-  }
-  const absl::StatusOr<Image> map = ErrorMap(beauty, scene);
-  ASSERT_TRUE(map.ok()) << map.status();
-  ASSERT_EQ(map->pixels.size(), size_t{3} * 300 * 300);
-  for (size_t i = 0; i < exact->rgba.size(); ++i) {
-    for (int c = 0; c < 3; ++c) {
-      const auto channel = static_cast<size_t>(c);
-      ASSERT_EQ(map->pixels[3 * i + channel],
-                static_cast<float>(static_cast<double>(beauty.pixels[4 * i + channel]) -
-                                   exact->rgba[i][c]));
-    }
-  }
-
-  const ErrorEstimate by_map = ErrorOf(beauty, *map);
-  const ErrorEstimate sampled = KnownFrame(beauty, exact->rgba).Estimate({.samples = 1000000});
-  EXPECT_GT(by_map.covered_pixels, 1000U);
-  EXPECT_EQ(by_map.covered_pixels, sampled.covered_pixels);
-  EXPECT_EQ(by_map.sampled_pixels, sampled.sampled_pixels);
-  for (const auto figure : {&ErrorEstimate::mean_square_error, &ErrorEstimate::bias,
-                            &ErrorEstimate::rmse, &ErrorEstimate::relative_rmse}) {
-    EXPECT_NEAR((by_map.*figure).value, (sampled.*figure).value, 1e-7);
-    EXPECT_EQ((by_map.*figure).low, (by_map.*figure).high);
-  }
-  EXPECT_NEAR(by_map.reference_mean, sampled.reference_mean, 1e-7);
-  EXPECT_NEAR(by_map.sample_p999, sampled.sample_p999, 1e-7);
-  EXPECT_NEAR(by_map.sample_max, sampled.sample_max, 1e-7);
-  ASSERT_EQ(by_map.sample_worst.size(), sampled.sample_worst.size());
-  for (size_t i = 0; i < sampled.sample_worst.size(); ++i) {
-    EXPECT_NEAR(by_map.sample_worst[i].largest, sampled.sample_worst[i].largest, 1e-7);
-  }
-}
-
-TEST(ErrorMap, IsCancelled) {
-  std::stop_source source;
-  source.request_stop();
-  const KnownFrame frame = MadeUpFrame(20, 20);
-  EXPECT_EQ(
-      ErrorMap(frame.beauty, reference::RandomScene(60, 20), source.get_token()).status().code(),
-      absl::StatusCode::kCancelled);
 }
 
 TEST(ErrorEstimate, RefusesTooFewSamplesAndIsCancelled) {

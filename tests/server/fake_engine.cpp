@@ -152,6 +152,11 @@ v1::RenderFrameRequest MakeRequest() {
   return request;
 }
 
+FrameJob MustConvert(const v1::RenderFrameRequest& request, const ServerLimits& limits) {
+  ParticleStore store(1 << 20);
+  return *ConvertRequest(request, store, limits);
+}
+
 bool WaitFor(const std::function<bool()>& ready) {
   const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(10);
   while (!ready()) {
