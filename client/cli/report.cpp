@@ -61,8 +61,7 @@ std::string ErrorText(const v1::MeasuredError& error) {
     const v1::PixelError& worst = error.sample_worst(0);
     text += fmt::format(
         "error: worst of them at x {}, y {}, where R G B are off by {:+.3g} {:+.3g} {:+.3g}; the "
-        "image "
-        "model's mean is {:.3g}\n",
+        "image model's mean is {:.3g}\n",
         worst.x(), worst.y(), worst.r(), worst.g(), worst.b(), error.reference_mean());
   }
   if (error.compared() == v1::COMPARED_FRAME_WITHOUT_SCATTERING) {

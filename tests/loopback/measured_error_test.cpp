@@ -94,7 +94,7 @@ TEST_F(MeasuredError, OfThePlumeHoldsTheTrueOne) {
   EXPECT_NEAR(whole.header.error().relative_rmse().value(), truth.relative_rmse, 1e-9);
 
   v1::RenderFrameRequest request = RequestOf(scene, {v1::OUTPUT_KIND_BEAUTY});
-  request.mutable_measure_error()->set_seed(5);
+  request.mutable_measure_error()->set_seed(5);  // of a hundred seeds, intervals miss with five
   const auto sampled = Render(request, scene);
   EXPECT_EQ(FloatsOf(sampled.outputs[0]), beauty) << "measuring does not change the frame";
   const v1::MeasuredError& error = sampled.header.error();
