@@ -18,7 +18,6 @@ namespace halflight {
 namespace {
 
 using testing::EncodePlain;
-using testing::FakeEngine;
 using testing::FakeImage;
 using ::testing::HasSubstr;
 using testing::MakeRequest;
