@@ -51,6 +51,12 @@ void DescribePasses(const Scene& scene, FramePlan& plan) {
 
 absl::StatusOr<FramePlan> PlanFrame(const FrameRequest& request, const ParticleView& particles) {
   const Scene& scene = request.scene;
+  for (const ImageRequest& image : request.images) {
+    if (image.kind == ImageKind::kError) {
+      return absl::InvalidArgumentError(
+          "outputs: error, allowed of the renderer: what is drawn; the error is made of a beauty");
+    }
+  }
   if (scene.shadow.technique == ShadowTechniqueKind::kReference) return PlanReferenceFrame(request);
   if (scene.lights.size() > kMaxLights) {
     return absl::InvalidArgumentError(absl::StrCat("lighting.lights: ", scene.lights.size(),
