@@ -1,6 +1,7 @@
 #include "tests/report/advice.h"
 
 #include <algorithm>
+#include <iterator>
 #include <limits>
 
 #include "tests/report/pareto.h"
@@ -19,17 +20,18 @@ std::vector<Summary> Summarize(const Results& results,
   std::vector<CostAndError> points;
   for (size_t setting = 0; setting < results.settings.size(); ++setting) {
     std::vector<double> ratios;
-    double worst = 0.0;
+    std::vector<double> errors;
     for (const Measurement& measurement : results.measurements) {
       const ReportScene& scene = results.scenes[measurement.scene];
       if (measurement.setting != setting || scene.part != Part::kMatrix || !includes(scene)) {
         continue;
       }
       ratios.push_back(measurement.time_ratio);
-      worst = std::max(worst, measurement.error.rmse);
+      errors.push_back(measurement.error.rmse);
     }
     if (ratios.empty()) continue;
-    summaries.push_back({setting, Median(ratios), worst, false});
+    const double worst = *std::max_element(errors.begin(), errors.end());
+    summaries.push_back({setting, Median(ratios), worst, Median(errors), false});
     points.push_back({summaries.back().time_ratio, worst});
   }
   const std::vector<bool> front = ParetoFront(points);
@@ -52,15 +54,18 @@ std::optional<Summary> CheapestWithin(const std::vector<Summary>& summaries, dou
 
 Summary BestInTimeOfBaseline(const std::vector<Summary>& summaries) {
   constexpr double kNearlyAsGood = 1.1;
-  std::vector<Summary> affordable;
+  // The baseline itself always qualifies: its ratio is 1 by definition.
+  const auto affordable = [](const Summary& summary) { return summary.time_ratio <= 1.0; };
   double least = std::numeric_limits<double>::infinity();
   for (const Summary& summary : summaries) {
-    // The baseline itself always qualifies: its ratio is 1 by definition.
-    if (summary.time_ratio > 1.0) continue;
-    affordable.push_back(summary);
-    least = std::min(least, summary.worst_error);
+    if (affordable(summary)) least = std::min(least, summary.median_error);
   }
-  return *CheapestWithin(affordable, kNearlyAsGood * least);
+  std::vector<Summary> good;
+  std::copy_if(summaries.begin(), summaries.end(), std::back_inserter(good),
+               [&](const Summary& summary) {
+                 return affordable(summary) && summary.median_error <= kNearlyAsGood * least;
+               });
+  return Fastest(good);
 }
 
 }  // namespace halflight::report

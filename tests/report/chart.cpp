@@ -1,6 +1,7 @@
 #include "tests/report/chart.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <utility>
 
@@ -20,8 +21,7 @@ double Fraction(const LogRange& range, double value) {
 }  // namespace
 
 bool Overlaps(const Box& a, const Box& b) {
-  return a.x < b.x + b.width && b.x < a.x + a.width && a.y < b.y + b.height &&
-         b.y < a.y + a.height;
+  return a.x < b.x + b.width && b.x < a.x + a.width && a.y < b.y + b.height && b.y < a.y + a.height;
 }
 
 LogRange RangeAround(const std::vector<double>& values) {
@@ -43,7 +43,7 @@ LogRange RangeAround(const std::vector<double>& values) {
 }
 
 std::vector<double> Ticks(const LogRange& range) {
-  constexpr double kMostSpan = 1000.0;
+  constexpr double kMostSpan = 1e4;
   std::vector<double> ticks;
   const auto first = static_cast<int>(std::floor(std::log10(range.low)));
   const auto last = static_cast<int>(std::ceil(std::log10(range.high)));
@@ -90,8 +90,18 @@ Point Chart::At(double x, double y) const {
           frame_.y + frame_.height * (1.0 - Fraction(y_.range, y))};
 }
 
-void Chart::Polyline(const std::vector<Point>& points, std::string_view color, double width) {
+void Chart::Curve(const std::vector<Point>& points, std::string_view color, double width) {
+  constexpr double kStep = 3.0;
   svg_.Polyline(points, color, width);
+  for (size_t i = 1; i < points.size(); ++i) {
+    const Point& from = points[i - 1];
+    const Point step{points[i].x - from.x, points[i].y - from.y};
+    const int steps = 1 + static_cast<int>(std::hypot(step.x, step.y) / kStep);
+    for (int k = 0; k <= steps; ++k) {
+      const double part = static_cast<double>(k) / steps;
+      curves_.push_back({from.x + part * step.x - 1, from.y + part * step.y - 1, 2, 2});
+    }
+  }
 }
 
 void Chart::Mark(Marker marker, Point at, std::string_view color, bool hollow) {
@@ -100,33 +110,39 @@ void Chart::Mark(Marker marker, Point at, std::string_view color, bool hollow) {
   taken_.push_back({at.x - kHalf, at.y - kHalf, 2 * kHalf, 2 * kHalf});
 }
 
-bool Chart::Label(Point beside, std::string_view text, const TextStyle& style) {
+void Chart::Label(Point beside, std::string_view text, const TextStyle& style) {
   const double width = TextWidth(text, style.size);
   const double height = style.size;
   constexpr double kGap = 8.0;
   // Offsets of the box's corner: below left first, since curves fall to the right.
-  const Point offsets[] = {
-      {-width - 2, kGap - 1},          {2, -height - kGap + 1},  {kGap, -height / 2},
-      {-width - kGap, -height / 2},    {-width / 2, kGap},       {-width / 2, -height - kGap},
-      {2, kGap - 1},                   {-width - 2, -height - kGap + 1},
-      {-width / 2, 2 * kGap + 2},      {-width / 2, -height - 2 * kGap - 2},
+  const std::array<Point, 10> offsets = {{{-width - 2, kGap - 1},
+                                          {2, -height - kGap + 1},
+                                          {kGap, -height / 2},
+                                          {-width - kGap, -height / 2},
+                                          {-width / 2, kGap},
+                                          {-width / 2, -height - kGap},
+                                          {2, kGap - 1},
+                                          {-width - 2, -height - kGap + 1},
+                                          {-width / 2, 2 * kGap + 2},
+                                          {-width / 2, -height - 2 * kGap - 2}}};
+  const auto free_of = [](const Box& box, const std::vector<Box>& others) {
+    return std::none_of(others.begin(), others.end(),
+                        [&](const Box& other) { return Overlaps(box, other); });
   };
-  for (const Point& offset : offsets) {
-    const Box box{beside.x + offset.x, beside.y + offset.y, width, height};
-    const bool inside = box.x >= frame_.x && box.y >= frame_.y &&
-                        box.x + width <= frame_.x + frame_.width &&
-                        box.y + height <= frame_.y + frame_.height;
-    const bool clear =
-        inside && std::none_of(taken_.begin(), taken_.end(),
-                               [&](const Box& other) { return Overlaps(box, other); });
-    if (!clear) continue;
-    TextStyle placed = style;
-    placed.anchor = Anchor::kMiddle;
-    svg_.Text({box.x + width / 2, box.y + 0.85 * height}, text, placed);
-    taken_.push_back(box);
-    return true;
+  for (const bool avoid_curves : {true, false}) {
+    for (const Point& offset : offsets) {
+      const Box box{beside.x + offset.x, beside.y + offset.y, width, height};
+      const bool inside = box.x >= frame_.x && box.y >= frame_.y &&
+                          box.x + width <= frame_.x + frame_.width &&
+                          box.y + height <= frame_.y + frame_.height;
+      if (!inside || !free_of(box, taken_) || (avoid_curves && !free_of(box, curves_))) continue;
+      TextStyle placed = style;
+      placed.anchor = Anchor::kMiddle;
+      svg_.Text({box.x + width / 2, box.y + 0.85 * height}, text, placed);
+      taken_.push_back(box);
+      return;
+    }
   }
-  return false;
 }
 
 }  // namespace halflight::report

@@ -28,7 +28,7 @@ struct LogRange {
 // Wide enough for all values > 0, and a little more at both ends; at least a factor of four.
 LogRange RangeAround(const std::vector<double>& values);
 
-// 1, 2, 5 and their decades within the range; only decades where it spans more than three.
+// 1, 2, 5 and their decades within the range; only decades where it spans more than four of them.
 std::vector<double> Ticks(const LogRange& range);
 
 struct Axis {
@@ -45,19 +45,21 @@ class Chart {
   // Where a pair of values lies. Values beyond the axes lie on the frame.
   [[nodiscard]] Point At(double x, double y) const;
 
-  void Polyline(const std::vector<Point>& points, std::string_view color, double width);
-  // Also keeps labels away from it.
+  // Labels keep away from it where they can.
+  void Curve(const std::vector<Point>& points, std::string_view color, double width);
+  // Labels keep away from it.
   void Mark(Marker marker, Point at, std::string_view color, bool hollow);
-  // Beside the point, where it covers neither marks nor other labels; where there is no such place,
-  // nothing. Call after all marks.
-  bool Label(Point beside, std::string_view text, const TextStyle& style);
+  // Beside the point, where it covers neither marks nor other labels, and curves only where there
+  // is no better place; where there is none at all, nothing. Call after all marks and curves.
+  void Label(Point beside, std::string_view text, const TextStyle& style);
 
  private:
   Svg& svg_;
   Box frame_;
   Axis x_;
   Axis y_;
-  std::vector<Box> taken_;
+  std::vector<Box> taken_;   // by marks and labels
+  std::vector<Box> curves_;  // small boxes along them
 };
 
 }  // namespace halflight::report

@@ -20,8 +20,8 @@ std::array<uint8_t, 3> ErrorColor(double error) {
   const double fraction = along - static_cast<double>(lower);
   std::array<uint8_t, 3> color{};
   for (size_t c = 0; c < 3; ++c) {
-    color[c] = static_cast<uint8_t>(std::lround(
-        (1.0 - fraction) * kColors[lower][c] + fraction * kColors[lower + 1][c]));
+    color[c] = static_cast<uint8_t>(
+        std::lround((1.0 - fraction) * kColors[lower][c] + fraction * kColors[lower + 1][c]));
   }
   return color;
 }

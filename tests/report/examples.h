@@ -24,8 +24,8 @@ struct Example {
 };
 
 // Of the last plume's dense scenes, cut to what the particles cover, on a dark ground. `settings`
-// are places in Results::settings. The renderer's thread. Errors as FrameRenderer::Render, and those
-// of the image library.
+// are places in Results::settings. The renderer's thread. Errors as FrameRenderer::Render, and
+// those of the image library.
 absl::StatusOr<std::vector<Example>> DrawExamples(FrameRenderer& renderer, const Results& results,
                                                   const std::vector<size_t>& settings);
 

@@ -10,8 +10,8 @@
 
 namespace halflight::report {
 
-// Over R, G and B, premultiplied and linear, of the covered pixels (coverage > 0.01), all divided by
-// the reference's mean over the same pixels.
+// Over R, G and B, premultiplied and linear, of the covered pixels (coverage > 0.01), all divided
+// by the reference's mean over the same pixels.
 struct FrameError {
   double rmse = 0.0;
   double rmse_low = 0.0;  // 95 % interval; rmse itself where every pixel was compared

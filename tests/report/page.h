@@ -19,6 +19,7 @@ struct Making {
   std::string version;
   std::string date;
   std::string command;
+  bool short_form;  // its figures mean nothing, which the page then says
 };
 
 // What the page advises where nothing more is known.

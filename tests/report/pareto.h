@@ -11,8 +11,8 @@ struct CostAndError {
   double error;
 };
 
-// True for each point that no other one beats: none costs no more and errs no more, and is better in
-// one of the two. Of equal points all are on the front, or none.
+// True for each point that no other one beats: none costs no more and errs no more, and is better
+// in one of the two. Of equal points all are on the front, or none.
 std::vector<bool> ParetoFront(std::span<const CostAndError> points);
 
 }  // namespace halflight::report

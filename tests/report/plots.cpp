@@ -45,7 +45,7 @@ std::string Count(double value) {
   return value >= 1e6 ? absl::StrFormat("%gM", value / 1e6) : absl::StrFormat("%gk", value / 1e3);
 }
 
-// One entry for each curve, from left to right; the next row where the line is full.
+// One entry for each curve, from left to right, in two rows at most. `at` is the first's place.
 void DrawKey(Svg& svg, const std::vector<Setting>& settings, Point at, double width) {
   constexpr double kTextSize = 12.0;
   Point pen = at;
@@ -53,7 +53,7 @@ void DrawKey(Svg& svg, const std::vector<Setting>& settings, Point at, double wi
   for (const Setting& setting : settings) {
     if (last == setting.curve_index) continue;
     last = setting.curve_index;
-    const double entry = TextWidth(setting.curve, kTextSize) + 30.0;
+    const double entry = TextWidth(setting.curve, kTextSize) + 26.0;
     if (pen.x + entry > at.x + width) pen = {at.x, pen.y + 18.0};
     const CurveStyle style = StyleOf(setting.curve_index);
     svg.Mark(style.marker, {pen.x, pen.y - 4.0}, style.color, false);
@@ -73,18 +73,18 @@ void DrawSummaries(Chart& chart, const Results& results, std::vector<Summary> su
             [](const Summary& a, const Summary& b) { return a.time_ratio < b.time_ratio; });
   std::vector<Point> steps;
   for (const Summary& summary : front) steps.push_back(at(summary));
-  chart.Polyline(steps, kFrontColor, 7.0);
+  chart.Curve(steps, kFrontColor, 7.0);
 
   for (size_t first = 0; first < summaries.size();) {
     const size_t curve = results.settings[summaries[first].setting].curve_index;
     std::vector<Point> points;
     size_t next = first;
-    for (; next < summaries.size() &&
-           results.settings[summaries[next].setting].curve_index == curve;
+    for (;
+         next < summaries.size() && results.settings[summaries[next].setting].curve_index == curve;
          ++next) {
       points.push_back(at(summaries[next]));
     }
-    chart.Polyline(points, StyleOf(curve).color, 1.2);
+    chart.Curve(points, StyleOf(curve).color, 1.2);
     first = next;
   }
   for (const Summary& summary : summaries) {
@@ -107,7 +107,7 @@ void DrawSummaries(Chart& chart, const Results& results, std::vector<Summary> su
 std::string PlotErrorAgainstTime(const Results& results, const std::string& opacity) {
   constexpr double kWidth = 860.0;
   constexpr double kHeight = 330.0;  // of a chart
-  constexpr double kKey = 58.0;
+  constexpr double kKey = 50.0;
   std::vector<std::pair<std::string, std::vector<Summary>>> groups;
   std::vector<double> times;
   std::vector<double> errors;
@@ -145,7 +145,7 @@ std::string PlotErrorAgainstTime(const Results& results, const std::string& opac
 std::string PlotScaling(const Results& results) {
   constexpr double kWidth = 860.0;
   constexpr double kHeight = 400.0;
-  constexpr double kKey = 58.0;
+  constexpr double kKey = 50.0;
   std::vector<double> counts;
   std::vector<double> times;
   for (const Measurement& measurement : results.measurements) {
@@ -154,14 +154,16 @@ std::string PlotScaling(const Results& results) {
     counts.push_back(static_cast<double>(scene.scene.particles->size()));
     times.push_back(measurement.time_ratio);
   }
+  LogRange range = RangeAround(counts);
+  range.high *= 3.0;  // the curves' names stand at their ends
   Svg svg(kWidth, kKey + kHeight, "Time against the number of particles");
   std::vector<Setting> drawn;
   std::copy_if(results.settings.begin(), results.settings.end(), std::back_inserter(drawn),
                [](const Setting& setting) { return setting.scaling_most > 0; });
   DrawKey(svg, drawn, {20.0, 24.0}, kWidth - 40.0);
   Chart chart(svg, {0.0, kKey, kWidth, kHeight}, "Cost against particles",
-              {RangeAround(counts), "particles", Count},
-              {RangeAround(times), "time, multiple of baseline's", Times});
+              {range, "particles", Count},
+              {RangeAround(times), "time, as a multiple of the baseline's", Times});
   struct End {
     Point at;
     const Setting* setting;
@@ -177,7 +179,7 @@ std::string PlotScaling(const Results& results) {
           chart.At(static_cast<double>(scene.scene.particles->size()), measurement.time_ratio));
     }
     if (points.empty()) continue;
-    chart.Polyline(points, style.color, 1.5);
+    chart.Curve(points, style.color, 1.5);
     for (const Point& point : points) chart.Mark(style.marker, point, style.color, false);
     ends.push_back({points.back(), &results.settings[setting]});
   }

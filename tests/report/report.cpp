@@ -52,9 +52,9 @@ absl::Status MakeReport(const ReportOptions& options) {
   if (!renderer.ok()) return renderer.status();
 
   // Measure.
-  const absl::StatusOr<Results> results =
-      MeasureAll(**renderer, *std::move(scenes), ListSettings(options.short_form),
-                 {options.repeats, std::min(options.repeats, kMostScalingRepeats), options.progress});
+  const absl::StatusOr<Results> results = MeasureAll(
+      **renderer, *std::move(scenes), ListSettings(options.short_form),
+      {options.repeats, std::min(options.repeats, kMostScalingRepeats), options.progress});
   if (!results.ok()) return results.status();
 
   // Draw what is shown.
@@ -63,9 +63,9 @@ absl::Status MakeReport(const ReportOptions& options) {
       DrawExamples(**renderer, *results, {BaselineOf(*results), Advised(*results).setting});
   if (!examples.ok()) return examples.status();
   const DeviceInfo& device = (*renderer)->device();
-  const Making making{CpuModel(),      std::thread::hardware_concurrency(),
+  const Making making{CpuModel(),         std::thread::hardware_concurrency(),
                       device.gl_renderer, device.gl_version,
-                      options.version, Today(),
+                      options.version,    Today(),
                       options.command};
 
   // Write it down.

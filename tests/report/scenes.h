@@ -39,8 +39,9 @@ std::vector<std::string> LightNames();
 // Name, and the opacity of one particle of the plume as it is.
 std::vector<std::pair<std::string, float>> Opacities();
 
-// Of the matrix, then by rising number of particles, one of them the scaling baseline. Matrix scenes
-// of one plume share their particles. NotFound, naming the file, where a plume cannot be read.
+// Of the matrix, then by rising number of particles, one of them the scaling baseline. Matrix
+// scenes of one plume share their particles. NotFound, naming the file, where a plume cannot be
+// read.
 absl::StatusOr<std::vector<ReportScene>> LoadScenes(const SceneOptions& options);
 
 }  // namespace halflight::report

@@ -100,17 +100,17 @@ void Svg::Text(Point at, std::string_view text, const TextStyle& style) {
   const std::string turn =
       style.upward ? absl::StrFormat(" transform=\"rotate(-90 %.1f %.1f)\"", at.x, at.y) : "";
   absl::StrAppendFormat(
-      &text_, "<text x=\"%.1f\" y=\"%.1f\" font-size=\"%.0f\" fill=\"%s\" text-anchor=\"%s\"%s%s>%s"
-              "</text>\n",
+      &text_,
+      "<text x=\"%.1f\" y=\"%.1f\" font-size=\"%.0f\" fill=\"%s\" text-anchor=\"%s\"%s%s>%s"
+      "</text>\n",
       at.x, at.y, style.size, std::string(style.color), NameOf(style.anchor),
       style.bold ? " font-weight=\"bold\"" : "", turn, Escaped(text));
 }
 
 void Svg::Mark(Marker marker, Point at, std::string_view color, bool hollow) {
   const std::string name(color);
-  absl::StrAppendFormat(
-      &text_, "<path d=\"%s\" fill=\"%s\" stroke=\"%s\" stroke-width=\"1.5\"/>\n",
-      PathOf(OutlineOf(marker, at), true), hollow ? kGround : name, name);
+  absl::StrAppendFormat(&text_, "<path d=\"%s\" fill=\"%s\" stroke=\"%s\" stroke-width=\"1.5\"/>\n",
+                        PathOf(OutlineOf(marker, at), true), hollow ? kGround : name, name);
 }
 
 std::string Svg::Finish() const { return absl::StrCat(text_, "</svg>\n"); }
