@@ -63,10 +63,14 @@ absl::Status MakeReport(const ReportOptions& options) {
       DrawExamples(**renderer, *results, {BaselineOf(*results), Advised(*results).setting});
   if (!examples.ok()) return examples.status();
   const DeviceInfo& device = (*renderer)->device();
-  const Making making{CpuModel(),         std::thread::hardware_concurrency(),
-                      device.gl_renderer, device.gl_version,
-                      options.version,    Today(),
-                      options.command};
+  const Making making{.cpu = CpuModel(),
+                      .cores = std::thread::hardware_concurrency(),
+                      .gl_renderer = device.gl_renderer,
+                      .gl_version = device.gl_version,
+                      .version = options.version,
+                      .date = Today(),
+                      .command = options.command,
+                      .short_form = options.short_form};
 
   // Write it down.
   std::vector<std::pair<std::string, std::string>> files = {
