@@ -25,6 +25,10 @@ struct Making {
 // What the page advises where nothing more is known.
 Summary Advised(const Results& results);
 
+// The page's first part: what to use for which error, over all scenes and by direction of the
+// light.
+std::string WriteAdvice(const Results& results);
+
 // Refers to the plots as error-dense.svg, error-thin.svg, scaling.svg and error-scale.svg, to the
 // table as measurements.csv, and to the examples by their files, all beside it.
 std::string WritePage(const Results& results, const std::vector<Example>& examples,

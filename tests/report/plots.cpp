@@ -131,11 +131,7 @@ std::string PlotErrorAgainstTime(const Results& results, const std::string& opac
   for (size_t i = 0; i < groups.size(); ++i) {
     const Box outer{static_cast<double>(i % 2) * kWidth / 2,
                     kKey + static_cast<double>(i / 2) * kHeight, kWidth / 2, kHeight};
-    const std::string& light = groups[i].first;
-    Chart chart(svg, outer,
-                absl::StrFormat("%s, light from %s (%.0f\u00b0)", opacity,
-                                light == "90 degrees" ? "the side" : "the " + light,
-                                DegreesFromView(light)),
+    Chart chart(svg, outer, absl::StrCat(opacity, ", light from the ", LightTitle(groups[i].first)),
                 time, error);
     DrawSummaries(chart, results, groups[i].second);
   }

@@ -10,6 +10,7 @@
 
 #include "absl/status/status.h"
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
 #include "tests/oracle/plume.h"
 #include "tests/renderer/test_scene.h"
 #include "tests/report/replicate.h"
@@ -41,7 +42,7 @@ constexpr std::array<std::pair<const char*, float>, 2> kOpacities = {{
 
 constexpr std::array<size_t, 4> kCounts = {8'192, 65'536, 262'144, 1'048'576};
 constexpr size_t kBaselineCount = 65'536;
-// The short form draws the same places and pictures, thinned out.
+// The short form thins the plume out.
 constexpr std::array<size_t, 2> kShortCounts = {1'024, 4'096};
 constexpr size_t kShortBaselineCount = 4'096;
 
@@ -80,8 +81,43 @@ Scene PlumeScene(const Replica& replica, const std::string& light, int size) {
   return scene;
 }
 
-size_t BaselineCount(const SceneOptions& options) {
-  return options.short_form ? kShortBaselineCount : kBaselineCount;
+int SizeOf(const SceneOptions& options) { return options.short_form ? 96 : 480; }
+
+void AddMatrix(const SceneOptions& options, const std::string& frame, const ParticleSet& plume,
+               std::vector<ReportScene>& scenes) {
+  const size_t count = options.short_form ? kShortBaselineCount : plume.size();
+  for (const auto& [opacity_name, opacity] : kOpacities) {
+    const Replica replica = Replicate(plume, count, opacity, kJitter);
+    for (const NamedLight& light : kLights) {
+      if (options.short_form && light.perpendicular) continue;
+      scenes.push_back({.name = absl::StrCat("plume", frame.substr(2), "-", opacity_name, "-",
+                                             light.perpendicular ? "90" : light.name),
+                        .plume = frame,
+                        .light = light.name,
+                        .opacity = opacity_name,
+                        .part = Part::kMatrix,
+                        .scene = PlumeScene(replica, light.name, SizeOf(options))});
+    }
+  }
+}
+
+void AddScaling(const SceneOptions& options, const std::string& frame, const ParticleSet& plume,
+                std::vector<ReportScene>& scenes) {
+  const char* const light = "side";
+  const auto& [opacity_name, opacity] = kOpacities[0];
+  std::vector<size_t> counts(kCounts.begin(), kCounts.end());
+  if (options.short_form) counts.assign(kShortCounts.begin(), kShortCounts.end());
+  const size_t baseline = options.short_form ? kShortBaselineCount : kBaselineCount;
+  for (const size_t count : counts) {
+    const Replica replica = Replicate(plume, count, opacity, kJitter);
+    scenes.push_back({.name = absl::StrCat("particles-", count),
+                      .plume = frame,
+                      .light = light,
+                      .opacity = opacity_name,
+                      .part = Part::kScaling,
+                      .scaling_baseline = count == baseline,
+                      .scene = PlumeScene(replica, light, SizeOf(options))});
+  }
 }
 
 }  // namespace
@@ -96,46 +132,24 @@ std::vector<std::string> LightNames() {
   return names;
 }
 
+std::string LightTitle(const std::string& light) {
+  return absl::StrFormat("%s (%.0f\u00b0)", light == "90 degrees" ? "side" : light,
+                         DegreesFromView(light));
+}
+
 std::vector<std::pair<std::string, float>> Opacities() {
   return {kOpacities.begin(), kOpacities.end()};
 }
 
 absl::StatusOr<std::vector<ReportScene>> LoadScenes(const SceneOptions& options) {
-  const int size = options.short_form ? 96 : 480;
+  const auto early = LoadFrame(options, "0024");
+  if (!early.ok()) return early.status();
+  const auto late = LoadFrame(options, "0040");
+  if (!late.ok()) return late.status();
   std::vector<ReportScene> scenes;
-  for (const std::string frame : {"0024", "0040"}) {
-    const auto plume = LoadFrame(options, frame);
-    if (!plume.ok()) return plume.status();
-    if (options.short_form && frame == "0024") continue;
-    const size_t count = options.short_form ? kShortBaselineCount : (*plume)->size();
-    for (const auto& [opacity_name, opacity] : kOpacities) {
-      const Replica replica = Replicate(**plume, count, opacity, kJitter);
-      for (const NamedLight& light : kLights) {
-        if (options.short_form && light.perpendicular) continue;
-        scenes.push_back({.name = absl::StrCat("plume", frame.substr(2), "-", opacity_name, "-",
-                                               light.perpendicular ? "90" : light.name),
-                          .plume = frame,
-                          .light = light.name,
-                          .opacity = opacity_name,
-                          .part = Part::kMatrix,
-                          .scene = PlumeScene(replica, light.name, size)});
-      }
-    }
-  }
-  const auto plume = LoadFrame(options, "0040");
-  if (!plume.ok()) return plume.status();
-  std::vector<size_t> counts(kCounts.begin(), kCounts.end());
-  if (options.short_form) counts.assign(kShortCounts.begin(), kShortCounts.end());
-  for (const size_t count : counts) {
-    const Replica replica = Replicate(**plume, count, kOpacities[0].second, kJitter);
-    scenes.push_back({.name = absl::StrCat("particles-", count),
-                      .plume = "0040",
-                      .light = "side",
-                      .opacity = kOpacities[0].first,
-                      .part = Part::kScaling,
-                      .scaling_baseline = count == BaselineCount(options),
-                      .scene = PlumeScene(replica, "side", size)});
-  }
+  if (!options.short_form) AddMatrix(options, "0024", **early, scenes);
+  AddMatrix(options, "0040", **late, scenes);
+  AddScaling(options, "0040", **late, scenes);
   return scenes;
 }
 

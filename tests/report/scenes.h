@@ -36,12 +36,14 @@ double DegreesFromView(const std::string& light);
 
 std::vector<std::string> LightNames();
 
+// For people, with the angle: "side (67°)".
+std::string LightTitle(const std::string& light);
+
 // Name, and the opacity of one particle of the plume as it is.
 std::vector<std::pair<std::string, float>> Opacities();
 
-// Of the matrix, then by rising number of particles, one of them the scaling baseline. Matrix
-// scenes of one plume share their particles. NotFound, naming the file, where a plume cannot be
-// read.
+// Of the matrix, then by rising number of particles, one of them the scaling baseline. NotFound,
+// naming the file, where a plume cannot be read.
 absl::StatusOr<std::vector<ReportScene>> LoadScenes(const SceneOptions& options);
 
 }  // namespace halflight::report
