@@ -151,7 +151,7 @@ std::string PlotScaling(const Results& results) {
     times.push_back(measurement.time_ratio);
   }
   LogRange range = RangeAround(counts);
-  range.high *= 3.0;  // the curves' names stand at their ends
+  range.high *= 5.0;  // the curves' names stand at their ends
   Svg svg(kWidth, kKey + kHeight, "Time against the number of particles");
   std::vector<Setting> drawn;
   std::copy_if(results.settings.begin(), results.settings.end(), std::back_inserter(drawn),
