@@ -77,6 +77,21 @@ PlaneBounds BoundsInPlane(const Projection& projection, const ParticleView& part
   return bounds;
 }
 
+// Whether any particle, its radius times `enlarged`, reaches the plane through `point` across the
+// unit vector `forward`.
+bool ReachesPlane(const glm::dvec3& point, const glm::dvec3& forward, double enlarged,
+                  const ParticleView& particles) {
+  const double origin_depth = glm::dot(forward, particles.set().origin - point);
+  std::atomic<bool> reaches = false;
+  ParallelRanges(particles.size(), [&](const WorkRange& range) {
+    for (size_t i = range.begin; i < range.end && !reaches; ++i) {
+      const double depth = origin_depth + glm::dot(forward, glm::dvec3(particles.positions()[i]));
+      if (depth < enlarged * particles.radius(i)) reaches = true;
+    }
+  });
+  return reaches;
+}
+
 }  // namespace
 
 glm::dmat4 Projection::texture_from_world() const {
@@ -130,15 +145,13 @@ Projection EyeProjection(const Camera& camera, const glm::ivec2& target_size, do
 
 bool ReachesEyePlane(const Projection& projection, const ParticleView& particles) {
   const glm::dvec3 forward = -glm::dvec3(glm::row(projection.view_from_world, 2));
-  const double origin_depth = glm::dot(forward, particles.set().origin - projection.eye());
-  std::atomic<bool> reaches = false;
-  ParallelRanges(particles.size(), [&](const WorkRange& range) {
-    for (size_t i = range.begin; i < range.end && !reaches; ++i) {
-      const double depth = origin_depth + glm::dot(forward, glm::dvec3(particles.positions()[i]));
-      if (depth < 1.001 * particles.radius(i)) reaches = true;
-    }
-  });
-  return reaches;
+  return ReachesPlane(projection.eye(), forward, 1.001, particles);
+}
+
+bool LiesAmong(const Light& light, const ParticleView& particles) {
+  const auto* point = std::get_if<PointLight>(&light.kind);
+  return point != nullptr &&
+         ReachesPlane(point->position, TravelDirection(light, particles), 1.0, particles);
 }
 
 glm::dvec3 TravelDirection(const Light& light, const ParticleView& particles) {
@@ -146,7 +159,9 @@ glm::dvec3 TravelDirection(const Light& light, const ParticleView& particles) {
     return directional->direction;
   }
   const auto& point = std::get<PointLight>(light.kind);
-  return glm::normalize((particles.set().origin - point.position) + particles.bounds().center());
+  const glm::dvec3 to_center =
+      (particles.set().origin - point.position) + particles.bounds().center();
+  return to_center != glm::dvec3(0.0) ? glm::normalize(to_center) : glm::dvec3(0.0, -1.0, 0.0);
 }
 
 Projection LightProjection(const Light& light, const ParticleView& particles, int size,
@@ -172,7 +187,9 @@ Projection LightProjection(const Light& light, const ParticleView& particles, in
   const glm::dmat3 rotation(projection.view_from_world);
   const double center_depth =
       -(rotation * (center + (particles.set().origin - projection.eye()))).z;
-  const double widen = projection.orthographic ? spread : spread / center_depth;
+  // Slopes from a point light; no particles are at no depth.
+  const double widen =
+      projection.orthographic || particles.size() == 0 ? spread : spread / center_depth;
   const glm::dvec2 low = bounds.low - widen;
   const glm::dvec2 high = bounds.high + widen;
   const glm::dvec2 texels_per_unit = (size - 2.0 * kBorderTexels) / (high - low);

@@ -40,12 +40,16 @@ bool ReachesEyePlane(const Projection& projection, const ParticleView& particles
 
 // A projection from a light onto a square light buffer, fitted to the particles: shows all of each
 // of them and leaves only the border that filtering needs. `spread` widens the border by that many
-// world units for light that scatters sideways. A point light must lie outside the particles.
+// world units for light that scatters sideways. A point light must not lie among the particles.
 Projection LightProjection(const Light& light, const ParticleView& particles, int size,
                            double spread);
 
+// Whether some particle reaches the plane through a point light, across the direction in which its
+// light travels at the particles: then no one frustum shows them all. Never so for other lights.
+bool LiesAmong(const Light& light, const ParticleView& particles);
+
 // The direction in which light travels at the particles: towards the centre of their bounds for a
-// point light. Unit length.
+// point light; downward, should it stand right there. Unit length.
 glm::dvec3 TravelDirection(const Light& light, const ParticleView& particles);
 
 }  // namespace halflight

@@ -85,6 +85,13 @@ HalfAngleAxis ComputeHalfAngleAxis(const glm::dvec3& view, const glm::dvec3& lig
 absl::StatusOr<Traversal> HalfAngle::PlanLight(const Scene& scene, const ParticleView& particles,
                                                int light) const {
   const Light& source = scene.lights[static_cast<size_t>(light)];
+  if (LiesAmong(source, particles)) {
+    const glm::dvec3& at = std::get<PointLight>(source.kind).position;
+    return absl::InvalidArgumentError(absl::StrCat(
+        "lighting.lights[", light, "].point.position: (", at.x, ", ", at.y, ", ", at.z,
+        "), allowed: outside the particles, for a light that casts shadows under technique "
+        "HALF_ANGLE"));
+  }
   const HalfAngleAxis half_angle =
       ComputeHalfAngleAxis(ViewDirection(scene.camera), TravelDirection(source, particles));
   Traversal traversal;
