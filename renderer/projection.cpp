@@ -143,6 +143,10 @@ Projection EyeProjection(const Camera& camera, const glm::ivec2& target_size, do
   return projection;
 }
 
+glm::dvec3 ViewDirection(const Camera& camera) {
+  return -glm::normalize(glm::dvec3(glm::row(camera.view_from_world, 2)));
+}
+
 bool ReachesEyePlane(const Projection& projection, const ParticleView& particles) {
   const glm::dvec3 forward = -glm::dvec3(glm::row(projection.view_from_world, 2));
   return ReachesPlane(projection.eye(), forward, 1.001, particles);

@@ -34,6 +34,9 @@ struct Projection {
 // pixel along each side (below 1: fewer samples than pixels).
 Projection EyeProjection(const Camera& camera, const glm::ivec2& target_size, double samples);
 
+// Along which the camera looks, in the world. Unit length.
+glm::dvec3 ViewDirection(const Camera& camera);
+
 // Whether any particle reaches the plane through the projection's eye, or comes so near to it that
 // rounding may tell otherwise.
 bool ReachesEyePlane(const Projection& projection, const ParticleView& particles);

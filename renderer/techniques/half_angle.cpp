@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include <glm/geometric.hpp>
-#include <glm/gtc/matrix_access.hpp>
 
 #include "absl/strings/str_cat.h"
 #include "renderer/frame.h"
@@ -13,10 +12,6 @@
 namespace halflight {
 
 namespace {
-
-glm::dvec3 ViewDirection(const Camera& camera) {
-  return -glm::normalize(glm::dvec3(glm::row(camera.view_from_world, 2)));
-}
 
 bool Scatters(const Scene& scene) {
   return scene.shadow.blur_mode == BlurMode::kTexelsPerSlice

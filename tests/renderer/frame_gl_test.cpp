@@ -197,6 +197,25 @@ TEST_F(Frame, IsCancelledWhenAskedTo) {
   EXPECT_EQ(frame.status().code(), absl::StatusCode::kCancelled);
 }
 
+TEST_F(Frame, SeenAlongParallelRaysIsOrderedByDepth) {
+  // The second lies deeper, but nearer to the middle of the image.
+  Scene scene = test::BallScene(0);
+  auto set = std::make_shared<ParticleSet>();
+  set->positions = {{1.0F, 0.0F, 0.1F}, {0.8F, 0.0F, 0.0F}};
+  set->colors = {{1.0F, 0.0F, 0.0F}, {0.0F, 1.0F, 0.0F}};
+  scene.particles = set;
+  scene.camera = test::LookAt({0, 0, 1.5}, {0, 0, 0}, 97, 97);
+  scene.camera.projection = Orthographic{2.4};
+  scene.material.radius = 0.3F;
+  scene.material.opacity = 0.9F;
+  for (const float density : {0.0F, 1e-30F}) {
+    scene.lights = {test::Sun({0, 0, -1}, density)};
+    const Image image = RenderBeauty(scene);
+    const float* pixel = PixelAt(image, 48 + 36, 48);
+    EXPECT_GT(pixel[0], 2.0F * pixel[1]) << density;
+  }
+}
+
 TEST_F(Frame, DoesNotReportWhatOneThatEndedEarlyLeftBehind) {
   const Scene scene = test::BallScene(10);
   Renderer();
