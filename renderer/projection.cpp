@@ -115,10 +115,16 @@ glm::dvec3 Projection::eye() const {
   return -glm::transpose(glm::dmat3(view_from_world)) * glm::dvec3(view_from_world[3]);
 }
 
-shader::ProjectionBlock Projection::block(const glm::dvec3& set_origin) const {
+shader::ProjectionBlock Projection::block(const ParticleView& particles) const {
+  const glm::dvec3 eye_from_origin = eye() - particles.set().origin;
+  // The place among the particles that is nearest the eye, in float32 as the shader has it.
+  const glm::vec3 near(
+      glm::clamp(eye_from_origin, particles.bounds().low, particles.bounds().high));
   shader::ProjectionBlock block;
   block.view_from_world = glm::mat4(glm::mat3(view_from_world));
-  block.origin_from_eye = glm::vec4(set_origin - eye(), 0.0F);
+  block.near_translation = glm::vec4(-near, 0.0F);
+  block.far_translation =
+      glm::vec4(glm::dmat3(view_from_world) * (glm::dvec3(near) - eye_from_origin), 0.0F);
   block.pixel_from_plane = glm::vec4(pixel_from_plane, pixel_offset);
   block.plane_from_pixel = glm::vec4(1.0 / pixel_from_plane, -pixel_offset / pixel_from_plane);
   block.target_size = glm::vec4(size, least_radius, 0.0F);

@@ -26,8 +26,8 @@ struct Projection {
   [[nodiscard]] glm::dmat4 texture_from_world() const;
   // Position of the eye (or light) in the world.
   [[nodiscard]] glm::dvec3 eye() const;
-  // The uniform block, for a set with this origin.
-  [[nodiscard]] shader::ProjectionBlock block(const glm::dvec3& set_origin) const;
+  // The uniform block, for these particles.
+  [[nodiscard]] shader::ProjectionBlock block(const ParticleView& particles) const;
 };
 
 // The eye's projection onto a target that samples the camera's window with `samples` samples a

@@ -2,9 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <limits>
-#include <memory>
 #include <numeric>
 #include <utility>
 
@@ -13,7 +11,8 @@
 #include <glm/gtc/matrix_transform.hpp>
 #include <glm/matrix.hpp>
 
-#include "tests/hard_cases/motions.h"
+#include "tests/hard_cases/hard_case.h"
+#include "tests/hard_cases/same_picture.h"
 #include "tests/oracle/oracle.h"
 #include "tests/reference/brute_force.h"
 
@@ -58,16 +57,9 @@ double DifferenceFromSum(const Image& sum, const std::vector<Image>& parts, cons
   });
 }
 
-ParticleSet& Edit(Scene& scene) {
-  auto set = std::make_shared<ParticleSet>(*scene.particles);
-  ParticleSet& editable = *set;
-  scene.particles = set;
-  return editable;
-}
-
 // Particles one a slice, however many there are: then a further one changes no other's slice.
 Scene OneParticleASlice(const Scene& scene) {
-  Scene sliced = WithOwnAttributes(scene);
+  Scene sliced = test::WithOwnAttributes(scene);
   sliced.shadow.slices = 65536;
   sliced.shadow.spacing = SliceSpacing::kEqualCount;
   return sliced;
@@ -91,7 +83,7 @@ double OfModel(const Render& render, Scene scene) {
     });
   }
   // The reference: at every seventh pixel, by loops that share nothing with it.
-  const Scene here = test::Moved(WithOwnAttributes(scene), -scene.particles->origin);
+  const Scene here = test::Moved(test::WithOwnAttributes(scene), -scene.particles->origin);
   double largest = image.pixels.empty() ? kInfinity : 0.0;
   for (size_t p = 3; p < image.pixels.size() / 4; p += 7) {
     const int width = scene.camera.window.width;
@@ -112,8 +104,8 @@ double EqualsModel(const Render& render, const Scene& scene, Dice& /*dice*/) {
 
 // A third of the particles once more, at the same places in other colours.
 double BreaksTiesByIndex(const Render& render, const Scene& scene, Dice& dice) {
-  Scene tied = WithOwnAttributes(scene);
-  ParticleSet& set = Edit(tied);
+  Scene tied = test::WithOwnAttributes(scene);
+  ParticleSet& set = test::EditParticles(tied);
   const size_t count = (set.size() + 2) / 3;
   for (size_t i = 0; i < count; ++i) {
     set.positions.push_back(set.positions[i]);
@@ -133,7 +125,7 @@ double IgnoresOrderOfParticles(const Render& render, const Scene& scene, Dice& d
     std::swap(order[i - 1], order[static_cast<size_t>(dice.Integer(0, static_cast<int>(i) - 1))]);
   }
   Scene shuffled = scene;
-  ParticleSet& set = Edit(shuffled);
+  ParticleSet& set = test::EditParticles(shuffled);
   Reorder(order, set.positions);
   Reorder(order, set.radii);
   Reorder(order, set.opacities);
@@ -233,7 +225,7 @@ double AmbientLightAddsUp(const Render& render, const Scene& scene, Dice& dice) 
 double IgnoresTransparentParticles(const Render& render, const Scene& scene, Dice& dice) {
   const Scene without = OneParticleASlice(scene);
   Scene with = without;
-  ParticleSet& set = Edit(with);
+  ParticleSet& set = test::EditParticles(with);
   // Between two others, so that the light buffer is fitted as before.
   const int last = static_cast<int>(set.size()) - 1;
   const auto i = static_cast<size_t>(dice.Integer(0, last));
@@ -276,7 +268,7 @@ double IgnoresWhatNobodySees(const Render& render, const Scene& scene, Dice& dic
   // Lights of the technique that stand outside the particles must not be among the new ones.
   std::erase_if(without.lights,
                 [](const Light& light) { return std::holds_alternative<PointLight>(light.kind); });
-  ParticleSet& set = Edit(without);
+  ParticleSet& set = test::EditParticles(without);
   const double radius = set.radii[0];
   const glm::dvec3 forward = -glm::dvec3(glm::row(scene.camera.view_from_world, 2));
   const glm::dvec3 eye = -glm::transpose(glm::dmat3(scene.camera.view_from_world)) *
@@ -299,7 +291,7 @@ double IgnoresWhatNobodySees(const Render& render, const Scene& scene, Dice& dic
   set.colors.emplace_back(1.0F);
   set.emissions.emplace_back(5.0F);
   Scene with = without;
-  Edit(with).opacities.back() = 0.9F;
+  test::EditParticles(with).opacities.back() = 0.9F;
   return Difference(BeautyOf(render, with), BeautyOf(render, without));
 }
 
@@ -342,11 +334,7 @@ double SameRequestGivesSameBytes(const Render& render, const Scene& scene, Dice&
   const Image once = BeautyOf(render, scene);
   const Image again = BeautyOf(render, scene);
   if (once.pixels.empty() || once.pixels.size() != again.pixels.size()) return kInfinity;
-  double different = 0.0;
-  for (size_t i = 0; i < once.pixels.size(); ++i) {
-    if (std::memcmp(&once.pixels[i], &again.pixels[i], sizeof(float)) != 0) ++different;
-  }
-  return different;
+  return test::DifferentFloats(once, again);
 }
 
 }  // namespace
@@ -354,27 +342,28 @@ double SameRequestGivesSameBytes(const Render& render, const Scene& scene, Dice&
 double BoundOf(const Property& property, const Scene& scene) {
   const bool shadows = std::any_of(scene.lights.begin(), scene.lights.end(),
                                    [](const Light& light) { return light.casts_shadows(); });
-  return shadows && scene.shadow.technique == ShadowTechniqueKind::kHalfAngle
-             ? property.bound_with_light_buffer
-             : property.bound;
+  if (!shadows || scene.shadow.technique == ShadowTechniqueKind::kReference) return property.bound;
+  // The rim of a ball is steep: texels show there more than elsewhere.
+  const double steep = scene.material.profile == Profile::kBall ? 5.0 : 1.0;
+  return std::max(property.bound, steep * property.bound_with_light_buffer);
 }
 
 const std::vector<Property>& Properties() {
   static const std::vector<Property> properties = {
-      {"EqualsModel", 3e-6, 3e-4, EqualsModel},
-      {"BreaksTiesByIndex", 3e-6, 2e-3, BreaksTiesByIndex},
+      {"EqualsModel", 3e-6, 1e-3, EqualsModel},
+      {"BreaksTiesByIndex", 3e-6, 1e-3, BreaksTiesByIndex},
       {"IgnoresOrderOfParticles", 0.0, 0.0, IgnoresOrderOfParticles},
-      {"JoinsWindows", 3e-6, 3e-6, JoinsWindows},
-      {"MovesWithTheWorld", 1e-6, 1e-6, MovesWithTheWorld},
-      {"ScalesWithTheWorld", 3e-6, 3e-6, ScalesWithTheWorld},
-      {"TurnsWithTheWorld", 3e-6, 2e-2, TurnsWithTheWorld},
-      {"DoublesWithTheLight", 1e-6, 1e-6, DoublesWithTheLight},
-      {"TwoEqualLightsAreOneOfTwiceTheColor", 1e-6, 1e-6, TwoEqualLightsAreOneOfTwiceTheColor},
-      {"AmbientLightAddsUp", 1e-6, 1e-6, AmbientLightAddsUp},
+      {"JoinsWindows", 3e-6, 0.0, JoinsWindows},
+      {"MovesWithTheWorld", 3e-6, 0.0, MovesWithTheWorld},
+      {"ScalesWithTheWorld", 1e-5, 0.0, ScalesWithTheWorld},
+      {"TurnsWithTheWorld", 3e-6, 4e-3, TurnsWithTheWorld},
+      {"DoublesWithTheLight", 1e-6, 0.0, DoublesWithTheLight},
+      {"TwoEqualLightsAreOneOfTwiceTheColor", 1e-6, 0.0, TwoEqualLightsAreOneOfTwiceTheColor},
+      {"AmbientLightAddsUp", 1e-6, 0.0, AmbientLightAddsUp},
       {"IgnoresTransparentParticles", 0.0, 0.0, IgnoresTransparentParticles},
       {"IgnoresWhatNobodySees", 0.0, 0.0, IgnoresWhatNobodySees},
-      {"CoversTheSameUnderAnyLight", 1e-6, 1e-6, CoversTheSameUnderAnyLight},
-      {"TransmittanceIsAFraction", 1e-6, 1e-6, TransmittanceIsAFraction},
+      {"CoversTheSameUnderAnyLight", 1e-6, 0.0, CoversTheSameUnderAnyLight},
+      {"TransmittanceIsAFraction", 1e-6, 0.0, TransmittanceIsAFraction},
       {"SameRequestGivesSameBytes", 0.0, 0.0, SameRequestGivesSameBytes},
   };
   return properties;

@@ -14,9 +14,9 @@ using Render = std::function<FrameResult(const FrameRequest&)>;
 
 struct Property {
   const char* name;
-  // Of the deviation: where there is only arithmetic to it, and where the texels of a light buffer
-  // show.
-  double bound;
+  double bound;  // of the deviation, where there is only arithmetic to it
+  // The same of SOFT particles where texels of a light buffer show; 0 where they make no
+  // difference.
   double bound_with_light_buffer;
   // How far `render` is from the property at this scene, relative to the image's brightness.
   double (*deviation)(const Render& render, const Scene& scene, Dice& dice);

@@ -13,7 +13,7 @@
 #include <glm/gtc/matrix_access.hpp>
 #include <glm/gtc/matrix_transform.hpp>
 #include <glm/matrix.hpp>
-#include "tests/hard_cases/motions.h"
+#include "tests/hard_cases/same_picture.h"
 
 namespace halflight::fuzz {
 namespace {
@@ -244,19 +244,6 @@ Scene DrawScene(Dice& dice) {
     scene = test::Moved(test::Scaled(scene, scale), scale * dice.Vector(-1e7, 1e7));
   }
   return scene;
-}
-
-Scene WithOwnAttributes(const Scene& scene) {
-  Scene own = scene;
-  auto set = std::make_shared<ParticleSet>(*scene.particles);
-  const size_t count = set->size();
-  if (set->radii.empty()) set->radii.assign(count, scene.material.radius);
-  if (set->opacities.empty()) set->opacities.assign(count, scene.material.opacity);
-  if (set->colors.empty()) set->colors.assign(count, glm::vec3(1.0F));
-  if (set->emissions.empty()) set->emissions.assign(count, scene.material.emission);
-  if (set->velocities.empty()) set->velocities.assign(count, glm::vec3(0.0F));
-  own.particles = set;
-  return own;
 }
 
 std::string Describe(const Scene& scene) {

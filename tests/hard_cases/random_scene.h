@@ -36,7 +36,4 @@ Scene DrawScene(Dice& dice);
 // For people: what was drawn, on a few lines.
 std::string Describe(const Scene& scene);
 
-// Every attribute given by the particle, and none moving: the same picture.
-Scene WithOwnAttributes(const Scene& scene);
-
 }  // namespace halflight::fuzz

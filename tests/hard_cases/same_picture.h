@@ -1,5 +1,5 @@
-// The whole scene moved, scaled or turned: the same picture.
-// Changes particles, camera and lights together, nothing else.
+// Other scenes that show the same picture: moved, scaled or turned as a whole, or said otherwise.
+// Renders nothing.
 #pragma once
 
 #include <glm/mat3x3.hpp>
@@ -17,5 +17,8 @@ Scene Scaled(Scene scene, double factor);
 
 // About the world's origin.
 Scene Turned(Scene scene, const glm::dmat3& rotation);
+
+// Every attribute given by the particles.
+Scene WithOwnAttributes(Scene scene);
 
 }  // namespace halflight::test

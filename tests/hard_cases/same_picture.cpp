@@ -1,4 +1,4 @@
-#include "tests/hard_cases/motions.h"
+#include "tests/hard_cases/same_picture.h"
 
 #include <cmath>
 #include <memory>
@@ -68,6 +68,18 @@ Scene Turned(Scene scene, const glm::dmat3& rotation) {
       sun.direction = glm::normalize(rotation * sun.direction);
     }
   }
+  return scene;
+}
+
+Scene WithOwnAttributes(Scene scene) {
+  auto set = CopyOf(scene);
+  const size_t count = set->size();
+  if (set->radii.empty()) set->radii.assign(count, scene.material.radius);
+  if (set->opacities.empty()) set->opacities.assign(count, scene.material.opacity);
+  if (set->colors.empty()) set->colors.assign(count, glm::vec3(1.0F));
+  if (set->emissions.empty()) set->emissions.assign(count, scene.material.emission);
+  if (set->velocities.empty()) set->velocities.assign(count, glm::vec3(0.0F));
+  scene.particles = set;
   return scene;
 }
 
