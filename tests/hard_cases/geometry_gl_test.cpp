@@ -43,6 +43,19 @@ TEST_F(Geometry, OneParticle) {
   Hold("one particle", scene, {6e-7, 2e-6, 2e-6, 1e-7});
 }
 
+TEST_F(Geometry, DenormalsAreAsGoodAsZero) {
+  Scene scene = test::BallScene(2, 40);
+  ParticleSet& set = test::EditParticles(scene);
+  set.positions[0] = {1e-40F, -1e-40F, 0.0F};
+  set.opacities = {0.5F, 1e-40F};
+  const Image denormal = RenderBeauty(scene);
+  ParticleSet& zeros = test::EditParticles(scene);
+  zeros.positions[0] = glm::vec3(0.0F);
+  zeros.opacities[1] = 0.0F;
+  test::ExpectAtMost("denormal offset and opacity", "from zeros, largest",
+                     test::MaxDifference(denormal, RenderBeauty(scene)), 1e-37);
+}
+
 TEST_F(Geometry, TwoCoplanarParticles) {
   // Overlapping at one depth, for the light as for the eye: the lower index shades the other.
   Scene scene = test::BallScene(0, 40);
