@@ -25,7 +25,7 @@ struct Traversal {
   std::vector<int> unshadowed_lights;
   bool ambient_and_emission = false;
 
-  // Unit vector along which particles are sorted, ascending; none: by distance from the eye's place.
+  // Unit vector along which particles are sorted, ascending; none: by distance from the eye.
   std::optional<glm::dvec3> axis;
   bool back_to_front = false;
   int slices = 1;

@@ -107,8 +107,8 @@ TEST_F(AngleSweep, JumpsNowhereButWhereTheAxisFlips) {
   test::ExpectAtMost(subject, "jump between neighbours over their own error", steepest, 1.5);
   test::ExpectAtMost(subject, "jump between neighbours, relative RMSE", elsewhere / brightness,
                      0.12);
-  test::ExpectAtMost(subject, "jump at the axis flip over the neighbours' error",
-                     flip / flip_error, 2.0);
+  test::ExpectAtMost(subject, "jump at the axis flip over the neighbours' error", flip / flip_error,
+                     2.0);
   test::ExpectAtMost(subject, "jump at the axis flip, relative RMSE", flip / brightness, 1.0);
   const double largest = *std::max_element(exact_jumps.begin(), exact_jumps.end());
   std::nth_element(exact_jumps.begin(), exact_jumps.begin() + 90, exact_jumps.end());
