@@ -74,6 +74,7 @@ void Reorder(const std::vector<size_t>& order, std::vector<T>& values) {
 }
 
 double OfModel(const Render& render, Scene scene) {
+  scene.sampling.downsample = 1;  // the model samples every pixel
   scene.shadow.light_buffer_size = 1024;
   const Image image = BeautyOf(render, scene);
   if (scene.shadow.technique == ShadowTechniqueKind::kHalfAngle) {
@@ -135,7 +136,9 @@ double IgnoresOrderOfParticles(const Render& render, const Scene& scene, Dice& d
   return Difference(BeautyOf(render, shuffled), BeautyOf(render, scene));
 }
 
-double JoinsWindows(const Render& render, const Scene& scene, Dice& dice) {
+double JoinsWindows(const Render& render, const Scene& drawn, Dice& dice) {
+  Scene scene = drawn;
+  scene.sampling.downsample = 1;  // its samples are those of the window, not of the image
   const PixelRect& window = scene.camera.window;
   const int split = dice.Integer(1, window.width - 1);
   Scene left = scene;
@@ -350,7 +353,7 @@ double BoundOf(const Property& property, const Scene& scene) {
                                    [](const Light& light) { return light.casts_shadows(); });
   if (!shadows || scene.shadow.technique == ShadowTechniqueKind::kReference) return property.bound;
   // The rim of a ball is steep: texels show there more than elsewhere.
-  const double steep = scene.material.profile == Profile::kBall ? 5.0 : 1.0;
+  const double steep = scene.material.profile == Profile::kBall ? 8.0 : 1.0;
   return std::max(property.bound, steep * property.bound_with_light_buffer);
 }
 

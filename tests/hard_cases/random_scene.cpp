@@ -234,7 +234,10 @@ Scene DrawScene(Dice& dice) {
   for (int lights = dice.Integer(0, 3); lights > 0; --lights) {
     scene.lights.push_back(DrawLight(dice, ViewOf(scene), reference));
   }
-  if (dice.Chance(0.25)) scene.sampling.supersample = dice.Integer(2, 3);
+  const double sampling = dice.Unit();
+  if (sampling < 0.25) scene.sampling.supersample = dice.Integer(2, 3);
+  // The reference samples every pixel.
+  if (!reference && sampling > 0.85) scene.sampling.downsample = dice.Integer(2, 3);
   // Slices of equal weight end where sums of weights are equal, which rounding decides.
   if (scene.particles->radii.empty()) scene.shadow.spacing = SliceSpacing::kEqualCount;
   while (DropTies(scene)) {
@@ -266,7 +269,7 @@ std::string Describe(const Scene& scene) {
        << scene.camera.width << " x " << scene.camera.height << ", window " << scene.camera.window.x
        << " " << scene.camera.window.y << " " << scene.camera.window.width << " "
        << scene.camera.window.height << ", supersample " << scene.sampling.supersample
-       << "\n  technique "
+       << ", downsample " << scene.sampling.downsample << "\n  technique "
        << (scene.shadow.technique == ShadowTechniqueKind::kReference ? "REFERENCE" : "HALF_ANGLE")
        << ", slices " << scene.shadow.slices << (scene.shadow.interpolate ? " interpolated" : "")
        << (scene.shadow.spacing == SliceSpacing::kEqualCount ? "" : " of equal optical depth")
