@@ -154,6 +154,7 @@ absl::StatusOr<FrameResult> FrameRenderer::Render(const FrameRequest& request,
     return result;
   }
   if (absl::Status status = CheckTargetSize(*plan, device()); !status.ok()) return status;
+  gl::ForgetErrors();
 
   // Bring particles and camera to the device.
   clock.BeginCpu("upload");
