@@ -106,7 +106,7 @@ shader::ProjectionBlock Projection::block(const glm::dvec3& set_origin) const {
   block.origin_from_eye = glm::vec4(set_origin - eye(), 0.0F);
   block.pixel_from_plane = glm::vec4(pixel_from_plane, pixel_offset);
   block.plane_from_pixel = glm::vec4(1.0 / pixel_from_plane, -pixel_offset / pixel_from_plane);
-  block.target_size = glm::vec4(size, least_radius, 0.0F);
+  block.target_size = glm::vec4(size, least_radius, optical_depth_scale);
   return block;
 }
 

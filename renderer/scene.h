@@ -82,6 +82,12 @@ struct Light {
 
 enum class Profile : uint8_t { kSoft, kBall };
 
+// A medium that scatters light, after Henyey and Greenstein 1941.
+struct PhysicalScattering {
+  float mean_cosine = 0.0F;  // [0, 1)
+  float albedo = 1.0F;       // share of the light met that is scattered, not absorbed: [0, 1]
+};
+
 struct Material {
   Profile profile = Profile::kSoft;
   float radius = 0.0F;  // where the set has none
@@ -90,7 +96,9 @@ struct Material {
   glm::vec3 emission{0.0F};
   glm::vec3 ambient{0.1F};
   float phase_g = 0.0F;
+  // How light scatters on its way to a particle (docs/scattering.md); at most one of the two.
   float scattering_spread = 0.0F;  // world units of standard deviation at distance 1
+  std::optional<PhysicalScattering> physical_scattering;
 };
 
 enum class ShadowTechniqueKind : uint8_t {
@@ -125,5 +133,12 @@ struct Scene {
   ShadowSettings shadow;
   Sampling sampling;
 };
+
+// Whether lights scatter on their way, which the image model and the reference know nothing of.
+inline bool Scatters(const Scene& scene) {
+  if (scene.shadow.blur_mode == BlurMode::kTexelsPerSlice) return scene.shadow.blur_texels > 0.0F;
+  const std::optional<PhysicalScattering>& physical = scene.material.physical_scattering;
+  return scene.material.scattering_spread > 0.0F || (physical && physical->albedo > 0.0F);
+}
 
 }  // namespace halflight

@@ -74,7 +74,8 @@ struct ProjectionBlock {
   vec4 origin_from_eye;   // xyz: particle origin minus eye, world axes
   vec4 pixel_from_plane;  // xy: scale, zw: offset
   vec4 plane_from_pixel;  // the inverse
-  vec4 target_size;       // xy: pixels; z: radii below this are drawn as this (plane units)
+  vec4 target_size;       // xy: pixels; z: radii below this are drawn as this (plane units);
+                          // w: scale of optical depths
 };
 
 // Values that serve where the particle set has no attribute of its own.
@@ -114,9 +115,9 @@ struct CompositeBlock {
 };
 
 struct BlurBlock {
-  uvec4 axis;                              // x, y: step in texels; z: radius in texels
-  vec4 density;                            // rgb shadow density of the light
-  vec4 weights[(kMaxBlurRadius + 1) / 4];  // by distance from the centre
+  uvec4 axis;                        // x, y: step in texels; z: radius in texels
+  vec4 density;                      // rgb shadow density of the light
+  vec4 weights[kMaxBlurRadius + 1];  // rgb, by distance from the centre
 };
 
 struct ResolveBlock {

@@ -35,12 +35,12 @@ void main() {
   vec3 kept = vec3(0.0);
   vec3 lost = vec3(0.0);
   for (int d = -radius; d <= radius; ++d) {
-    float weight = blur.weights[abs(d) >> 2][abs(d) & 3];
+    vec3 weight = blur.weights[abs(d)].rgb;
     vec3 depth = blur.density.rgb * (Fetch(d) - least);
     for (int c = 0; c < kChannels; ++c) {
       float opacity = OpacityFromOpticalDepth(depth[c]);
-      lost[c] += weight * opacity;
-      kept[c] += weight * (depth[c] < 1.0 ? 1.0 - opacity : exp(-depth[c]));
+      lost[c] += weight[c] * opacity;
+      kept[c] += weight[c] * (depth[c] < 1.0 ? 1.0 - opacity : exp(-depth[c]));
     }
   }
   blurred = vec4(0.0);

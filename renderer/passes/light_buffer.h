@@ -27,10 +27,16 @@ absl::Status DepositSlice(Gpu& gpu, const OrderBuffers& order, const gl::Buffer&
 
 void CopyLightBuffer(const LightBuffer& from, const LightBuffer& to);
 
-// Spreads the light in `buffer` sideways by these variances along x and y, in squared texels;
-// `density` is the light's shadow density. `scratch` is of the same size, its contents are lost.
+// How far light spreads sideways: variances along x and y of each colour, in squared texels.
+struct BlurVariance {
+  glm::dvec3 x;
+  glm::dvec3 y;
+};
+
+// Spreads the light in `buffer`; `density` is the light's shadow density. Of a buffer that is not
+// colored only red counts. `scratch` is of the same size, its contents are lost.
 absl::Status BlurLightBuffer(Gpu& gpu, LightBuffer& buffer, LightBuffer& scratch,
-                             const glm::dvec2& variance, const glm::vec3& density, bool colored);
+                             const BlurVariance& variance, const glm::vec3& density, bool colored);
 
 // The optical depth as it stands; one or three channels. Waits for the device.
 Image ReadLightBuffer(const LightBuffer& buffer, bool colored);
