@@ -131,10 +131,10 @@ double ForwardExtinction(const PhysicalScattering& scattering) {
 
 void SpreadMoments::Advance(double thickness, double scattering_coefficient, double mean_cosine) {
   // In layers denser than this light does not get ahead enough to spread.
-  constexpr double kMostDepth = 4096.0;
+  constexpr double kMostDepth = 256.0;
   const double depth = std::min(scattering_coefficient * thickness, kMostDepth);
   if (!(thickness > 0.0)) return;
-  const double steps = std::max(1.0, std::ceil(4.0 * depth));
+  const double steps = std::max(1.0, std::ceil(8.0 * depth));
   const double h = thickness / steps;
   const double turn = depth / thickness * (1.0 - mean_cosine);
   const double blunt = depth / thickness * (1.0 - mean_cosine * mean_cosine);
