@@ -117,6 +117,53 @@ LayeredColumns CutIntoColumns(const ParticleView& particles, const Light& light,
   return cut;
 }
 
+// The scattered light of one colour, layer by layer: lateral variance at the layers' edges. Light
+// scattered in a layer starts with the directions of one scattering, and with no covariance of
+// direction and place; it is the older light's that grows and decays as Lewis 1950 says.
+std::vector<double> Variances(const LayeredColumns& cut, double thickness, double density,
+                              const PhysicalScattering& scattering) {
+  const double g = scattering.mean_cosine;
+  const double once = (1.0 - g * g) / 3.0;
+  const double forward = scattering.albedo * ForwardFraction(g);
+  const double lost = 1.0 - forward;
+  std::vector<double> depth(cut.columns);  // before the layer
+  double angular = 0.0;
+  double covariance = 0.0;
+  std::vector<double> variance = {0.0};
+  for (size_t layer = 0; layer < kLayers; ++layer) {
+    const double* const in_layer = &cut.optical_depth[layer * cut.columns];
+    double older = 0.0;       // scattered before the layer, and left behind it
+    double scattered = 0.0;   // all that is left behind it
+    double collisions = 0.0;  // of scattered light, in the layer
+    for (size_t column = 0; column < cut.columns; ++column) {
+      const double before = density * depth[column];
+      const double after = before + density * in_layer[column];
+      const double left = std::exp(-lost * after) - std::exp(-after);
+      older += std::exp(-lost * after) - std::exp(lost * (before - after) - before);
+      scattered += left;
+      collisions += left * (after - before);
+      depth[column] += in_layer[column];
+    }
+    double increase = 2.0 * covariance * thickness;
+    if (scattered > 0.0) {
+      const double met = forward * collisions / scattered;
+      const double turned = met * (1.0 - g);
+      const double blunted = std::exp(-met * (1.0 - g * g));
+      const double middle = 0.5 * (1.0 + blunted) * (angular - 1.0 / 3.0) + 1.0 / 3.0;
+      const double kept = turned > 0.0 ? -std::expm1(-turned) / turned : 1.0;
+      const double older_angular = 1.0 / 3.0 + blunted * (angular - 1.0 / 3.0);
+      const double older_covariance = covariance * std::exp(-turned) + middle * kept * thickness;
+      const double share = 1.0 - older / scattered;
+      angular = glm::mix(older_angular, once, share);
+      increase = covariance * thickness;
+      covariance = glm::mix(older_covariance, 0.5 * once * thickness, share);
+      increase += covariance * thickness;
+    }
+    variance.push_back(variance.back() + increase);
+  }
+  return variance;
+}
+
 }  // namespace
 
 double ForwardFraction(double mean_cosine) {
@@ -129,73 +176,19 @@ double ForwardExtinction(const PhysicalScattering& scattering) {
   return 1.0 - scattering.albedo * ForwardFraction(scattering.mean_cosine);
 }
 
-void SpreadMoments::Advance(double thickness, double scattering_coefficient, double mean_cosine) {
-  // In layers denser than this light does not get ahead enough to spread.
-  constexpr double kMostDepth = 256.0;
-  const double depth = std::min(scattering_coefficient * thickness, kMostDepth);
-  if (!(thickness > 0.0)) return;
-  const double steps = std::max(1.0, std::ceil(8.0 * depth));
-  const double h = thickness / steps;
-  const double turn = depth / thickness * (1.0 - mean_cosine);
-  const double blunt = depth / thickness * (1.0 - mean_cosine * mean_cosine);
-  const auto rate = [&](const SpreadMoments& m) {
-    return SpreadMoments{blunt * (1.0 / 3.0 - m.angular), m.angular - turn * m.covariance,
-                         2.0 * m.covariance};
-  };
-  const auto after = [](const SpreadMoments& m, const SpreadMoments& slope, double by) {
-    return SpreadMoments{m.angular + by * slope.angular, m.covariance + by * slope.covariance,
-                         m.lateral + by * slope.lateral};
-  };
-  // The method of Runge and Kutta of fourth order, which is exact in the limit of small angles.
-  for (double step = 0.0; step < steps; ++step) {
-    const SpreadMoments k1 = rate(*this);
-    const SpreadMoments k2 = rate(after(*this, k1, 0.5 * h));
-    const SpreadMoments k3 = rate(after(*this, k2, 0.5 * h));
-    const SpreadMoments k4 = rate(after(*this, k3, h));
-    *this = after(after(after(after(*this, k1, h / 6.0), k2, h / 3.0), k3, h / 3.0), k4, h / 6.0);
-  }
-}
-
 PhysicalSpread::PhysicalSpread(const ParticleView& particles, const Light& light,
                                const glm::dvec3& axis, const PhysicalScattering& scattering,
                                Profile profile) {
   const LayeredColumns cut = CutIntoColumns(particles, light, axis, profile);
-  const double along_axis = glm::dot(TravelDirection(light, particles), axis);
   begin_ = cut.begin;
   layer_ = cut.length / static_cast<double>(kLayers);
   if (!(layer_ > 0.0)) return;
-  const double thickness = layer_ / along_axis;
-  const double density =
-      (light.shadow_density.r + light.shadow_density.g + light.shadow_density.b) / 3.0;
-  const double lost = density * ForwardExtinction(scattering);
-
-  // A column counts by how much it can shade, and by the light that is left in it.
-  std::vector<double> whole(cut.columns);
-  for (size_t i = 0; i < cut.optical_depth.size(); ++i) {
-    whole[i % cut.columns] += cut.optical_depth[i];
-  }
-  std::vector<double> before(cut.columns);
-  std::array<SpreadMoments, 3> moments;
-  for (size_t layer = 0; layer < kLayers; ++layer) {
-    const double* const in_layer = &cut.optical_depth[layer * cut.columns];
-    double weights = 0.0;
-    double weighted_depth = 0.0;
-    for (size_t column = 0; column < cut.columns; ++column) {
-      const double weight =
-          -std::expm1(-density * whole[column]) * std::exp(-lost * before[column]);
-      weights += weight;
-      weighted_depth += weight * in_layer[column];
-      before[column] += in_layer[column];
-    }
-    const double depth = weights > 0.0 ? weighted_depth / weights : 0.0;
-    glm::dvec3 variance;
-    for (glm::length_t c = 0; c < 3; ++c) {
-      SpreadMoments& of_color = moments[static_cast<size_t>(c)];
-      of_color.Advance(thickness, scattering.albedo * light.shadow_density[c] * depth / thickness,
-                       scattering.mean_cosine);
-      variance[c] = of_color.lateral;
-    }
-    variance_.push_back(variance);
+  const double thickness = layer_ / glm::dot(TravelDirection(light, particles), axis);
+  variance_.resize(kLayers + 1);
+  for (glm::length_t c = 0; c < 3; ++c) {
+    const std::vector<double> variance =
+        Variances(cut, thickness, light.shadow_density[c], scattering);
+    for (size_t edge = 0; edge <= kLayers; ++edge) variance_[edge][c] = variance[edge];
   }
 }
 

@@ -20,31 +20,20 @@ double ForwardFraction(double mean_cosine);
 // ahead is not lost, 1 - albedo * forward fraction.
 double ForwardExtinction(const PhysicalScattering& scattering);
 
-// The moments of a thin beam at a depth, per axis across it: variance of the direction, covariance
-// of direction and place, variance of the place.
-struct SpreadMoments {
-  double angular = 0.0;
-  double covariance = 0.0;
-  double lateral = 0.0;
-
-  // Through a homogeneous layer of this thickness and scattering coefficient: the moment equations
-  // of Lewis 1950 ("Multiple scattering in an infinite medium", Phys. Rev. 78, 526) for the phase
-  // function of Henyey and Greenstein, of which the small-angle theory of Fermi and Eyges,
-  // lateral variance = b (1 - g^2) s^3 / 9, is the limit for small b s.
-  void Advance(double thickness, double scattering_coefficient, double mean_cosine);
-};
-
-// How far light of each colour spreads on its way through a cloud.
+// How far the scattered light of each colour spreads on its way through a cloud; light that has not
+// been scattered does not spread.
 class PhysicalSpread {
  public:
   // Positions are along `axis`, a unit vector, from the centre of the particles' bounds, as in
-  // ParticleOrder. Takes the cloud as layers across the axis, each homogeneous: its scattering
-  // coefficient is the mean over where the light meets the cloud, weighted by the light left.
+  // ParticleOrder. Follows the scattered light of the whole cloud through layers across the axis:
+  // how much there is, the variance of its directions and their covariance with place, by the
+  // moment equations of Lewis 1950 ("Multiple scattering in an infinite medium", Phys. Rev. 78,
+  // 526), of which the small-angle theory of Fermi and Eyges is the limit for thin media.
   PhysicalSpread(const ParticleView& particles, const Light& light, const glm::dvec3& axis,
                  const PhysicalScattering& scattering, Profile profile);
 
-  // Squared world units per axis, of the light that has come from before the cloud to this
-  // position; never falls along the axis. Infinity is behind the cloud.
+  // Squared world units per axis across the light: light scattered at one position has, at another
+  // behind it, the difference of the two. Infinity is behind the cloud.
   [[nodiscard]] glm::dvec3 VarianceAt(double position) const;
 
  private:

@@ -61,6 +61,7 @@ HALFLIGHT_CONSTANT(kNearEyeConstant, 14);
 HALFLIGHT_CONSTANT(kColoredDensityConstant, 15);
 HALFLIGHT_CONSTANT(kVaryingLightsConstant, 16);
 HALFLIGHT_CONSTANT(kShadowLightVariesConstant, 17);
+HALFLIGHT_CONSTANT(kUnscatteredLightConstant, 18);
 
 HALFLIGHT_CONSTANT(kProjectGroupSize, 64);
 HALFLIGHT_CONSTANT(kMaxLightsInTraversal, 16);

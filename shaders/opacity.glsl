@@ -15,5 +15,5 @@ float OpticalDepthFromOpacity(float a, float complement) {
   float series =
       a * (1.0 + a * (0.5 + a * (1.0 / 3.0 +
            a * (0.25 + a * (0.2 + a * (1.0 / 6.0 + a * (1.0 / 7.0)))))));
-  return a < kSeriesLimit ? series : -log(complement);
+  return abs(a) < kSeriesLimit ? series : -log(complement);
 }

@@ -34,13 +34,14 @@ const gl::ProgramSource& BlurProgram() {
 // One pass of the kernel of `variance`, taking every stride-th texel along `axis`.
 absl::Status BlurOnce(Gpu& gpu, const LightBuffer& from, const LightBuffer& to,
                       const glm::uvec2& axis, uint32_t stride, const glm::dvec3& variance,
-                      const glm::vec3& density, bool colored) {
+                      const glm::vec3& density, const LightChannels& channels) {
   const absl::StatusOr<GLuint> program =
-      gpu.programs.Get(BlurProgram(), {{shader::kColoredLightBufferConstant, colored}});
+      gpu.programs.Get(BlurProgram(), {{shader::kColoredLightBufferConstant, channels.colored},
+                                       {shader::kUnscatteredLightConstant, channels.unscattered}});
   if (!program.ok()) return program.status();
   shader::BlurBlock block{};
   size_t radius = 0;
-  for (glm::length_t c = 0; c < (colored ? 3 : 1); ++c) {
+  for (glm::length_t c = 0; c < (channels.colored ? 3 : 1); ++c) {
     const std::vector<float> weights = DiscreteGaussian(variance[c]);
     for (size_t n = 0; n < weights.size(); ++n) block.weights[n][c] = weights[n];
     radius = std::max(radius, weights.size() - 1);
@@ -63,15 +64,15 @@ absl::Status BlurOnce(Gpu& gpu, const LightBuffer& from, const LightBuffer& to,
 // have smoothed, later ones may take in strides, so that any width needs a handful of passes.
 absl::Status BlurAlongAxis(Gpu& gpu, LightBuffer& buffer, LightBuffer& scratch,
                            const glm::uvec2& axis, const glm::dvec3& variance,
-                           const glm::vec3& density, bool colored) {
+                           const glm::vec3& density, const LightChannels& channels) {
   // Light spread further than the buffer is wide is the same everywhere.
   glm::dvec3 left = glm::min(variance, glm::dvec3(std::pow(buffer.texture.width(), 2)));
-  for (uint32_t stride = 1; left.r > 0.0 || (colored && (left.g > 0.0 || left.b > 0.0));
+  for (uint32_t stride = 1; left.r > 0.0 || (channels.colored && (left.g > 0.0 || left.b > 0.0));
        stride *= 4) {
     const double squared_stride = stride * stride;
     const glm::dvec3 now = glm::min(left, glm::dvec3(kMaxBlurVariance * squared_stride));
     if (absl::Status status =
-            BlurOnce(gpu, buffer, scratch, axis, stride, now / squared_stride, density, colored);
+            BlurOnce(gpu, buffer, scratch, axis, stride, now / squared_stride, density, channels);
         !status.ok()) {
       return status;
     }
@@ -83,13 +84,13 @@ absl::Status BlurAlongAxis(Gpu& gpu, LightBuffer& buffer, LightBuffer& scratch,
 
 }  // namespace
 
-LightBuffer MakeLightBuffer(const char* label, int size, bool colored) {
+LightBuffer MakeLightBuffer(const char* label, int size, const LightChannels& channels) {
   LightBuffer buffer;
-  // Three channels live in four: drawing into RGB32F is not required of drivers.
-  buffer.texture = gl::Texture({.label = label,
-                                .format = static_cast<GLenum>(colored ? GL_RGBA32F : GL_R32F),
-                                .width = size,
-                                .height = size});
+  // Three channels live in four, the last of them for the unscattered light: drawing into RGB32F is
+  // not required of drivers.
+  GLenum format = channels.unscattered ? GL_RG32F : GL_R32F;
+  if (channels.colored) format = GL_RGBA32F;
+  buffer.texture = gl::Texture({.label = label, .format = format, .width = size, .height = size});
   buffer.framebuffer = gl::MakeFramebuffer(label, {&buffer.texture});
   constexpr std::array<float, 4> kZero = {};
   glClearNamedFramebufferfv(buffer.framebuffer.name(), GL_COLOR, 0, kZero.data());
@@ -97,13 +98,16 @@ LightBuffer MakeLightBuffer(const char* label, int size, bool colored) {
 }
 
 absl::Status DepositSlice(Gpu& gpu, const OrderBuffers& order, const gl::Buffer& light_splats,
-                          const TargetProjection& light, Profile profile, uint32_t begin,
-                          uint32_t end, const LightBuffer& target) {
+                          const TargetProjection& light, Profile profile,
+                          const LightChannels& channels, uint32_t begin, uint32_t end,
+                          const LightBuffer& target) {
   const gl::DebugScope scope("deposit slice into light buffer");
   const absl::StatusOr<GLuint> program = gpu.programs.Get(
       DepositProgram(), {
                             {shader::kOrthographicConstant, light.projection.orthographic},
                             {shader::kBallProfileConstant, profile == Profile::kBall},
+                            {shader::kColoredLightBufferConstant, channels.colored},
+                            {shader::kUnscatteredLightConstant, channels.unscattered},
                         });
   if (!program.ok()) return program.status();
   glBindFramebuffer(GL_FRAMEBUFFER, target.framebuffer.name());
@@ -124,11 +128,12 @@ void CopyLightBuffer(const LightBuffer& from, const LightBuffer& to) {
 }
 
 absl::Status BlurLightBuffer(Gpu& gpu, LightBuffer& buffer, LightBuffer& scratch,
-                             const BlurVariance& variance, const glm::vec3& density, bool colored) {
+                             const BlurVariance& variance, const glm::vec3& density,
+                             const LightChannels& channels) {
   const gl::DebugScope scope("blur light buffer");
-  absl::Status status = BlurAlongAxis(gpu, buffer, scratch, {1, 0}, variance.x, density, colored);
+  absl::Status status = BlurAlongAxis(gpu, buffer, scratch, {1, 0}, variance.x, density, channels);
   if (!status.ok()) return status;
-  return BlurAlongAxis(gpu, buffer, scratch, {0, 1}, variance.y, density, colored);
+  return BlurAlongAxis(gpu, buffer, scratch, {0, 1}, variance.y, density, channels);
 }
 
 Image ReadLightBuffer(const LightBuffer& buffer, bool colored) {

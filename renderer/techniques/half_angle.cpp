@@ -80,6 +80,10 @@ glm::dvec2 TexelsPerUnit(const Projection& light, const ParticleView& particles)
          glm::distance(particles.set().origin + particles.bounds().center(), light.eye());
 }
 
+LightChannels ChannelsOf(const Traversal& traversal) {
+  return {.colored = traversal.colored_light_buffer, .unscattered = traversal.keep_unscattered};
+}
+
 // The light buffers of a traversal. `before` holds what the slices so far left; `after` also the
 // current slice, and `scratch` is the blur's; neither exists unless it is needed.
 struct LightBuffers {
@@ -89,10 +93,10 @@ struct LightBuffers {
 
   explicit LightBuffers(const Traversal& traversal) {
     const int size = traversal.light_buffer_size;
-    const bool colored = traversal.colored_light_buffer;
-    before = MakeLightBuffer("light buffer", size, colored);
-    if (traversal.interpolate) after = MakeLightBuffer("light buffer, next", size, colored);
-    if (traversal.blur) scratch = MakeLightBuffer("light buffer, blur", size, colored);
+    const LightChannels channels = ChannelsOf(traversal);
+    before = MakeLightBuffer("light buffer", size, channels);
+    if (traversal.interpolate) after = MakeLightBuffer("light buffer, next", size, channels);
+    if (traversal.blur) scratch = MakeLightBuffer("light buffer, blur", size, channels);
   }
 };
 
@@ -126,6 +130,7 @@ absl::StatusOr<Traversal> HalfAngle::PlanLight(const Scene& scene, const Particl
   traversal.spacing = scene.shadow.spacing;
   traversal.light_buffer_size = scene.shadow.light_buffer_size;
   traversal.blur = Scatters(scene);
+  traversal.keep_unscattered = traversal.blur && scene.material.physical_scattering;
   traversal.colored_light_buffer = traversal.blur && source.colored_density();
   return traversal;
 }
@@ -200,7 +205,7 @@ absl::StatusOr<ShadowResult> HalfAngle::Draw(const TraversalContext& context,
   const auto blur = [&](double from, double to) {
     return BlurLightBuffer(gpu, buffers.before, buffers.scratch,
                            spread->InTexels(from, to, texels_per_unit), source.shadow_density,
-                           traversal.colored_light_buffer);
+                           ChannelsOf(traversal));
   };
   ShadowResult result;
   for (size_t s = 0; s + 1 < order.slice_begin.size(); ++s) {
@@ -216,7 +221,7 @@ absl::StatusOr<ShadowResult> HalfAngle::Draw(const TraversalContext& context,
     LightBuffer& deposit_into = traversal.interpolate ? buffers.after : buffers.before;
     const auto deposit = [&] {
       return DepositSlice(gpu, order_buffers, *light_splats, light, context.scene.material.profile,
-                          begin, end, deposit_into);
+                          ChannelsOf(traversal), begin, end, deposit_into);
     };
     const auto draw = [&] {
       const SliceLight slice_light{buffers.before, deposit_into};

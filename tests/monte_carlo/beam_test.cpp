@@ -76,19 +76,6 @@ TEST(Beam, TendsToTheSmallAngleFormulaAtSmallDepth) {
   }
 }
 
-TEST(SpreadMoments, AreTheMomentEquationsForAnyCutIntoLayers) {
-  for (const double g : {0.0, 0.5, 0.9}) {
-    for (const double s : {0.01, 1.0, 10.0}) {
-      for (const int layers : {1, 7, 100}) {
-        SpreadMoments moments;
-        for (int layer = 0; layer < layers; ++layer) moments.Advance(s / layers, 1.0, g);
-        const double exact = g == 0.0 ? moments.lateral : Lewis(g, s);
-        EXPECT_NEAR(moments.lateral / exact, 1.0, 1e-4) << g << " " << s << " " << layers;
-      }
-    }
-  }
-}
-
 // Light that crosses a plane at depth s forward has tails without a variance: one scattering at
 // nearly right angles reaches as far as one likes. Half the light's width is another matter.
 TEST(Beam, AtADepthHasTailsThatTheVarianceDoesNotTell) {

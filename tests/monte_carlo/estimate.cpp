@@ -52,8 +52,7 @@ void Estimate(const ParticleMedium& medium, const Scatterer& scatterer, const gl
            });
   }
 
-  const double irradiance =
-      static_cast<double>(photons) / ((high.x - low.x) * (high.y - low.y));
+  const double irradiance = static_cast<double>(photons) / ((high.x - low.x) * (high.y - low.y));
   for (size_t i = 0; i < cloud.particles.size(); ++i) {
     const double whole =
         irradiance * medium.density() * CrossSection(cloud.particles[i], cloud.profile);
@@ -74,9 +73,8 @@ LightEstimate EstimateLight(const ParticleMedium& medium, const Scatterer& scatt
                             const glm::dvec3& direction, size_t photons, uint64_t seed) {
   LightEstimate estimate;
   {
-    const std::jthread first([&] {
-      Estimate(medium, scatterer, direction, photons, 2 * seed, estimate.a);
-    });
+    const std::jthread first(
+        [&] { Estimate(medium, scatterer, direction, photons, 2 * seed, estimate.a); });
     Estimate(medium, scatterer, direction, photons, 2 * seed + 1, estimate.b);
   }
   return estimate;

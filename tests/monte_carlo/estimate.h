@@ -41,8 +41,8 @@ struct LightEstimate {
   ParticleLight b;
 };
 
-// Light travelling along `direction` (unit length) falls evenly on the whole cloud. `photons` is the
-// number for each of the two estimates. The same seed gives the same values.
+// Light travelling along `direction` (unit length) falls evenly on the whole cloud. `photons` is
+// the number for each of the two estimates. The same seed gives the same values.
 LightEstimate EstimateLight(const ParticleMedium& medium, const Scatterer& scatterer,
                             const glm::dvec3& direction, size_t photons, uint64_t seed);
 

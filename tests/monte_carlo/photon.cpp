@@ -23,8 +23,8 @@ glm::dvec3 Scattered(const glm::dvec3& direction, double mean_cosine, Random& ra
       std::abs(direction.z) < 0.7 ? glm::dvec3(0.0, 0.0, 1.0) : glm::dvec3(1.0, 0.0, 0.0);
   const glm::dvec3 u_axis = glm::normalize(glm::cross(direction, other));
   const glm::dvec3 v_axis = glm::cross(direction, u_axis);
-  return glm::normalize(cosine * direction + sine * (std::cos(azimuth) * u_axis +
-                                                     std::sin(azimuth) * v_axis));
+  return glm::normalize(cosine * direction +
+                        sine * (std::cos(azimuth) * u_axis + std::sin(azimuth) * v_axis));
 }
 
 }  // namespace halflight::monte_carlo

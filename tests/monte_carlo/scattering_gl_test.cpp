@@ -1,17 +1,18 @@
-// The light buffer's scattering against Monte Carlo.
+// Scattered light as the light buffer holds it, with both modes and with none, against path
+// tracing: the figures of docs/scattering.md. With HALFLIGHT_SCATTERING_LONG=1 in the environment
+// also the widths and densities that fit best, more light and other albedos.
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
+#include <map>
 #include <string>
+#include <tuple>
 
 #include <glm/geometric.hpp>
 
-#include "renderer/frame.h"
-#include "renderer/particle_order.h"
-#include "renderer/scattering.h"
+#include "tests/monte_carlo/buffered_light.h"
 #include "tests/monte_carlo/estimate.h"
 #include "tests/oracle/plume.h"
 #include "tests/renderer/gl_fixture.h"
@@ -19,137 +20,252 @@
 namespace halflight {
 namespace {
 
-struct Judgement {
-  double relative_rmse = 0.0;
-  double bias = 0.0;
+using monte_carlo::LightEstimate;
+
+constexpr uint64_t kSeed = 3;
+
+bool LongForm() {
+  const char* const value = std::getenv("HALFLIGHT_SCATTERING_LONG");
+  return value != nullptr && std::string(value) == "1";
+}
+
+struct LightError {
+  double relative_rmse;
+  double bias;  // relative
 };
+
+// What the particles' light is compared by: means over cubes of this edge, as an image shows
+// particles over one another, of those particles that `counts`.
+struct Comparison {
+  double cube = 0.0;
+  bool (*counts)(const glm::vec3&) = [](const glm::vec3&) { return true; };
+};
+
+// The squared error is the mean of (model - a) (model - b), in which the noise of the two
+// independent estimates has no share.
+LightError Compare(const Scene& scene, const std::vector<double>& model,
+                   const std::vector<double>& a, const std::vector<double>& b,
+                   const Comparison& by) {
+  struct Sums {
+    double count = 0.0;
+    double model = 0.0;
+    double a = 0.0;
+    double b = 0.0;
+  };
+  std::map<std::tuple<int, int, int>, Sums> cubes;
+  const std::vector<glm::vec3>& positions = scene.particles->positions;
+  for (size_t i = 0; i < positions.size(); ++i) {
+    if (!by.counts(positions[i])) continue;
+    const glm::ivec3 cube(glm::floor(glm::dvec3(positions[i]) / by.cube));
+    Sums& sums = cubes[{cube.x, cube.y, cube.z}];
+    sums.count += 1.0;
+    sums.model += model[i];
+    sums.a += a[i];
+    sums.b += b[i];
+  }
+  Sums all;
+  double squares = 0.0;
+  for (const auto& [cube, sums] : cubes) {
+    squares += (sums.model - sums.a) * (sums.model - sums.b) / sums.count;
+    all.count += sums.count;
+    all.model += sums.model;
+    all.a += sums.a;
+    all.b += sums.b;
+  }
+  const double mean = 0.5 * (all.a + all.b) / all.count;
+  return {std::sqrt(std::max(squares, 0.0) / all.count) / mean, all.model / all.count / mean - 1.0};
+}
 
 class ScatteredLight : public test::GlTest {
  protected:
-  static std::vector<glm::dvec3> Samples(Profile profile) {
-    std::vector<glm::dvec3> s;
-    monte_carlo::Random random(5);
-    while (s.size() < 32) {
-      const glm::dvec3 p(2 * random.Uniform() - 1, 2 * random.Uniform() - 1, 2 * random.Uniform() - 1);
-      const double inside = 1.0 - glm::dot(p, p);
-      if (inside <= 0.0) continue;
-      if (profile == Profile::kSoft && random.Uniform() > std::sqrt(inside)) continue;
-      s.push_back(p);
-    }
-    return s;
+  // Looks along the light, so that slices lie across it.
+  static Scene SceneAlong(const glm::dvec3& travel, std::shared_ptr<const ParticleSet> particles) {
+    Scene scene;
+    scene.particles = std::move(particles);
+    scene.camera = test::LookAt(-9.0 * travel, {0, 0, 0}, 16, 16);
+    scene.lights = {test::Sun(travel)};
+    scene.shadow.slices = 96;
+    scene.shadow.light_buffer_size = 256;
+    return scene;
   }
 
-  static std::vector<double> LightAtParticles(const Scene& scene) {
-    const FrameResult frame = Render({scene, {{ImageKind::kLightLayers, 0, LightQuantity::kTransmittance}}});
-    const Image& layers = frame.images[0];
-    const ParticleView particles(scene);
-    const ParticleOrder order = OrderParticles(particles, frame.plan.traversals[0], {});
-    const glm::dvec3 axis = *frame.plan.traversals[0].axis;
-    const glm::dvec3 center = particles.bounds().center();
-    const auto coordinate = [&](size_t i) {
-      return glm::dot(glm::dvec3(particles.positions()[i]) - center, axis);
-    };
-    std::vector<double> ends;
-    for (size_t s = 0; s + 1 < order.slice_begin.size(); ++s) {
-      const uint32_t end = order.slice_begin[s + 1];
-      const double last = coordinate(order.particles[end - 1].index);
-      ends.push_back(end < particles.size() ? 0.5 * (last + coordinate(order.particles[end].index)) : last);
-    }
-    const double begin = coordinate(order.particles[0].index);
-    const glm::dmat4& texture = frame.lights[0].light_texture_from_world;
-    const auto depth_at = [&](size_t layer, const glm::dvec2& at) {
-      const glm::dvec2 p = at * glm::dvec2(layers.width, layers.height) - 0.5;
-      const glm::ivec2 f = glm::clamp(glm::ivec2(glm::floor(p)), glm::ivec2(0), glm::ivec2(layers.width - 2, layers.height - 2));
-      const glm::dvec2 t = glm::clamp(p - glm::dvec2(f), 0.0, 1.0);
-      const float* row = &layers.pixels[(layer * layers.height + f.y) * layers.width + f.x];
-      const float* row2 = row + layers.width;
-      return (row[0] * (1 - t.x) + row[1] * t.x) * (1 - t.y) + (row2[0] * (1 - t.x) + row2[1] * t.x) * t.y;
-    };
-    const std::vector<glm::dvec3> samples = Samples(scene.material.profile);
-    std::vector<double> light(particles.size());
-    for (size_t i = 0; i < particles.size(); ++i) {
-      for (const glm::dvec3& sample : samples) {
-        const glm::dvec3 p = glm::dvec3(particles.positions()[i]) + sample * double(particles.radius(i));
-        const double z = glm::dot(p - center, axis);
-        const size_t layer = std::upper_bound(ends.begin(), ends.end(), z) - ends.begin();
-        const glm::dvec4 at = texture * glm::dvec4(p + particles.set().origin, 1.0);
-        const glm::dvec2 place = glm::dvec2(at) / at.w;
-        if (layer == ends.size()) {
-          light[i] += depth_at(layer - 1, place);
-          continue;
-        }
-        const double from = layer == 0 ? begin : ends[layer - 1];
-        const double t = std::clamp((z - from) / (ends[layer] - from), 0.0, 1.0);
-        const double before = layer == 0 ? 1.0 : depth_at(layer - 1, place);
-        const double after = depth_at(layer, place);
-        light[i] += std::exp((1 - t) * std::log(std::max(before, 1e-30)) + t * std::log(std::max(after, 1e-30)));
-      }
-      light[i] /= samples.size();
-    }
-    return light;
+  static std::vector<double> Light(const Scene& scene) {
+    return monte_carlo::LightAtParticles(
+        scene, Render({scene, {{ImageKind::kLightLayers, 0, LightQuantity::kTransmittance}}}));
   }
 
-  static Judgement Judge(const std::vector<double>& model, const std::vector<double>& a, const std::vector<double>& b) {
-    double squares = 0, diff = 0, mean = 0;
-    for (size_t i = 0; i < model.size(); ++i) {
-      squares += (model[i] - a[i]) * (model[i] - b[i]);
-      diff += model[i] - 0.5 * (a[i] + b[i]);
-      mean += 0.5 * (a[i] + b[i]);
-    }
-    const double n = model.size();
-    return {std::sqrt(std::max(squares / n, 0.0)) / (mean / n), diff / mean};
+  static LightEstimate Trace(const Scene& scene, const monte_carlo::Scatterer& scatterer,
+                             size_t photons) {
+    const reference::Cloud cloud = reference::ResolveCloud(scene);
+    const monte_carlo::ParticleMedium medium(cloud, scene.lights[0].shadow_density.x);
+    return EstimateLight(medium, scatterer,
+                         std::get<DirectionalLight>(scene.lights[0].kind).direction,
+                         LongForm() ? 10 * photons : photons, kSeed);
+  }
+
+  static Scene WithPhysical(Scene scene, double g, double albedo) {
+    scene.material.physical_scattering =
+        PhysicalScattering{static_cast<float>(g), static_cast<float>(albedo)};
+    return scene;
+  }
+
+  static Scene WithArtistic(Scene scene, double spread, double density_scale) {
+    scene.material.scattering_spread = static_cast<float>(spread);
+    scene.lights[0].shadow_density *= static_cast<float>(density_scale);
+    return scene;
   }
 };
 
-TEST_F(ScatteredLight, Explore) {
-  Scene scene;
-  scene.particles = oracle::LoadPlume(std::string(HALFLIGHT_TEST_DATA) + "/plume/plume.0040.ply");
-  const glm::dvec3 travel = glm::normalize(glm::dvec3(1, -0.6, -0.4));
-  scene.camera = test::LookAt(-6.0 * travel, {0, 0, 0}, 16, 16);
-  scene.lights = {test::Sun(travel, std::getenv("K") ? atof(std::getenv("K")) : 1.0)};
-  scene.material.radius = 0.045F;
-  scene.material.opacity = 0.18F;
-  scene.shadow.slices = 128;
-  scene.shadow.light_buffer_size = 256;
-  const size_t photons = std::getenv("N") ? atoi(std::getenv("N")) : 100000;
-  const reference::Cloud cloud = reference::ResolveCloud(scene);
-  const monte_carlo::ParticleMedium medium(cloud, scene.lights[0].shadow_density.x);
-  const double albedo = std::getenv("W") ? atof(std::getenv("W")) : 0.9;
-  for (const double g : {-1.0, 0.5, 0.8, 0.9}) {
-    const double w = g < 0 ? 0.0 : albedo;
-    const auto light = monte_carlo::EstimateLight(medium, {std::max(g, 0.0), w}, travel, photons, 3);
-    double flux = 0, ffl = 0, all = 0;
-    for (size_t i = 0; i < cloud.particles.size(); ++i) {
-      flux += light.a.forward_flux[i];
-      ffl += light.a.forward_fluence[i];
-      all += light.a.fluence[i];
-    }
-    const double n = cloud.particles.size();
-    std::printf("g %.1f albedo %.2f mean forward flux %.4f forward fluence %.4f fluence %.4f\n", g, w, flux / n, ffl / n, all / n);
-    const auto report = [&](const char* name, const std::vector<double>& m) {
-      const Judgement f = Judge(m, light.a.forward_flux, light.b.forward_flux);
-      const Judgement ff = Judge(m, light.a.forward_fluence, light.b.forward_fluence);
-      const Judgement fl = Judge(m, light.a.fluence, light.b.fluence);
-      std::printf("  %-24s flux rmse %.3f bias %+.3f   ffluence %.3f %+.3f   fluence %.3f %+.3f\n", name, f.relative_rmse, f.bias, ff.relative_rmse, ff.bias, fl.relative_rmse, fl.bias);
-      std::fflush(stdout);
-    };
-    Scene s = scene;
-    report("none", LightAtParticles(s));
-    if (g < 0) continue;
-    s.material.physical_scattering = PhysicalScattering{float(g), float(albedo)};
-    report("physical", LightAtParticles(s));
-    for (const float shrink : {0.5F, 0.25F}) {
-      (void)shrink;
-    }
-    s.material.physical_scattering.reset();
-    s.lights[0].shadow_density = scene.lights[0].shadow_density * float(ForwardExtinction({float(g), float(albedo)}));
-    report("k_eff without blur", LightAtParticles(s));
-    s.lights[0].shadow_density = scene.lights[0].shadow_density;
-    for (const float spread : {0.05F, 0.1F, 0.2F, 0.4F}) {
-      s.material.scattering_spread = spread;
-      report(("artistic " + std::to_string(spread)).c_str(), LightAtParticles(s));
+// An artist's settings that fit best: the spread alone, or with it the shadow density.
+struct Artistic {
+  double spread;
+  double fitted_spread;
+  double fitted_density;  // times the true one
+};
+
+struct JudgedCase {
+  double g;
+  double albedo;
+  Artistic artistic;
+  double bound_physical;  // relative RMSE
+};
+
+// Prints a row of the table in docs/scattering.md, and returns the error of the physical mode.
+class Judge {
+ public:
+  Judge(Scene scene, LightEstimate light, Comparison by)
+      : scene_(std::move(scene)), light_(std::move(light)), by_(by) {}
+
+  LightError Report(const char* name, const std::vector<double>& model) const {
+    const LightError flux =
+        Compare(scene_, model, light_.a.forward_flux, light_.b.forward_flux, by_);
+    const LightError fluence = Compare(scene_, model, light_.a.fluence, light_.b.fluence, by_);
+    std::printf("  %-34s %6.1f %% (%+5.1f %%)   of fluence %6.1f %% (%+5.1f %%)\n", name,
+                100.0 * flux.relative_rmse, 100.0 * flux.bias, 100.0 * fluence.relative_rmse,
+                100.0 * fluence.bias);
+    std::fflush(stdout);
+    return flux;
+  }
+
+ private:
+  Scene scene_;
+  LightEstimate light_;
+  Comparison by_;
+};
+
+class JudgedLight : public ScatteredLight {
+ protected:
+  // The best fit among a grid of settings, printed.
+  static void Fit(const Judge& judge, const Scene& scene) {
+    for (const bool fit_density : {false, true}) {
+      LightError best{1e9, 0.0};
+      double best_spread = 0.0;
+      double best_density = 1.0;
+      for (const double spread : {0.0, 0.03, 0.06, 0.1, 0.15, 0.2, 0.3, 0.4, 0.6}) {
+        for (const double density : {1.0, 0.7, 0.5, 0.35, 0.25, 0.18, 0.12, 0.08}) {
+          if (!fit_density && density != 1.0) continue;
+          const LightError error = judge.Report("", Light(WithArtistic(scene, spread, density)));
+          if (error.relative_rmse < best.relative_rmse) {
+            best = error;
+            best_spread = spread;
+            best_density = density;
+          }
+        }
+      }
+      std::printf("best fit: spread %.2f, density %.2f: %.1f %%\n", best_spread, best_density,
+                  100.0 * best.relative_rmse);
     }
   }
+
+  static void JudgeScene(const char* name, const Scene& scene, const Comparison& by,
+                         std::vector<JudgedCase> cases, size_t photons, double bound_floor) {
+    const double density = scene.lights[0].shadow_density.x;
+    const std::vector<double> unscattered = Light(scene);
+    {
+      std::printf("%s, density %.1f, no scattering; seed %d\n", name, density,
+                  static_cast<int>(kSeed));
+      const Judge judge(scene, Trace(scene, {0.0, 0.0}, photons), by);
+      EXPECT_LT(judge.Report("light buffer", unscattered).relative_rmse, bound_floor);
+    }
+    for (const JudgedCase& c : cases) {
+      std::printf("%s, density %.1f, g %.1f, albedo %.2f\n", name, density, c.g, c.albedo);
+      const Judge judge(scene, Trace(scene, {c.g, c.albedo}, photons), by);
+      const LightError none = judge.Report("no scattering", unscattered);
+      const LightError spread = judge.Report("artistic, spread fitted",
+                                             Light(WithArtistic(scene, c.artistic.spread, 1.0)));
+      const LightError fitted = judge.Report(
+          "artistic, spread and density fitted",
+          Light(WithArtistic(scene, c.artistic.fitted_spread, c.artistic.fitted_density)));
+      const LightError physical =
+          judge.Report("physical", Light(WithPhysical(scene, c.g, c.albedo)));
+      EXPECT_LT(physical.relative_rmse, c.bound_physical);
+      EXPECT_LT(physical.relative_rmse, none.relative_rmse);
+      EXPECT_LT(physical.relative_rmse, spread.relative_rmse);
+      EXPECT_LT(std::abs(physical.bias), std::abs(none.bias));
+      (void)fitted;
+      if (LongForm()) Fit(judge, scene);
+    }
+  }
+};
+
+Scene PlumeScene(Scene scene, double density) {
+  scene.material.radius = 0.045F;
+  scene.material.opacity = 0.18F;
+  scene.lights[0].shadow_density = glm::vec3(static_cast<float>(density));
+  return scene;
+}
+
+class PlumeOf : public JudgedLight, public testing::WithParamInterface<double> {};
+
+TEST_F(JudgedLight, InThePlumeIsNearestWithThePhysicalMode) {
+  const auto particles =
+      oracle::LoadPlume(std::string(HALFLIGHT_TEST_DATA) + "/plume/plume.0040.ply");
+  ASSERT_NE(particles, nullptr);
+  const Scene scene = SceneAlong(glm::normalize(glm::dvec3(1.0, -0.6, -0.4)), particles);
+  const Comparison by{.cube = 0.09};
+  JudgeScene("plume", PlumeScene(scene, 0.2), by,
+             {{0.5, 0.9, {0.4, 0.1, 0.35}, 0.3},
+              {0.8, 0.9, {0.4, 0.1, 0.25}, 0.3},
+              {0.9, 0.9, {0.4, 0.1, 0.18}, 0.3}},
+             10000, 0.2);
+  JudgeScene("plume", PlumeScene(scene, 1.0), by, {{0.8, 0.9, {0.4, 0.1, 0.25}, 0.6}}, 10000, 0.6);
+}
+
+// A wide homogeneous layer, one unit deep, behind the edge of an opaque screen.
+std::shared_ptr<const ParticleSet> EdgeAndLayer(double layer_depth) {
+  auto set = std::make_shared<ParticleSet>();
+  const auto add = [&](const glm::dvec3& place, double radius, double optical_depth) {
+    set->positions.emplace_back(place);
+    set->radii.push_back(static_cast<float>(radius));
+    set->opacities.push_back(static_cast<float>(-std::expm1(-optical_depth)));
+  };
+  for (double x = -1.96; x < 0.0; x += 0.04) {
+    for (double y = -1.98; y < 2.0; y += 0.04) add({x, y, -0.2}, 0.06, 12.0);
+  }
+  constexpr int kParticles = 16000;
+  constexpr double kRadius = 0.1;
+  constexpr double kArea = 4.0 * 4.0;
+  monte_carlo::Random random(9);
+  for (int n = 0; n < kParticles; ++n) {
+    const double x = 4.0 * random.Uniform() - 2.0;
+    const double y = 4.0 * random.Uniform() - 2.0;
+    add({x, y, random.Uniform()}, kRadius,
+        layer_depth * kArea / (kParticles * 0.5 * M_PI * kRadius * kRadius));
+  }
+  return set;
+}
+
+TEST_F(JudgedLight, BehindAnEdgeIsNearestWithThePhysicalMode) {
+  const Scene scene = SceneAlong({0.0, 0.0, 1.0}, EdgeAndLayer(2.0));
+  // The layer's middle, without what lies near its sides or the screen's.
+  const Comparison by{.cube = 0.1, .counts = [](const glm::vec3& p) {
+                        return std::abs(p.x) < 1.0F && std::abs(p.y) < 1.0F && p.z >= 0.0F;
+                      }};
+  JudgeScene("edge", scene, by,
+             {{0.5, 0.9, {0.2, 0.1, 0.5}, 0.3},
+              {0.8, 0.9, {0.2, 0.1, 0.35}, 0.3},
+              {0.9, 0.9, {0.2, 0.1, 0.25}, 0.3}},
+             100000, 0.2);
 }
 
 }  // namespace

@@ -114,8 +114,8 @@ TEST_P(ParticleMediumOf, GivesTwoParticlesInARowTheLightThatTheyAbsorb) {
   EXPECT_NE(light.a.fluence[1], light.b.fluence[1]);
 }
 
-INSTANTIATE_TEST_SUITE_P(Profiles, ParticleMediumOf, testing::Values(Profile::kSoft, Profile::kBall),
-                         [](const auto& param) {
+INSTANTIATE_TEST_SUITE_P(Profiles, ParticleMediumOf,
+                         testing::Values(Profile::kSoft, Profile::kBall), [](const auto& param) {
                            return param.param == Profile::kSoft ? "Soft" : "Ball";
                          });
 
