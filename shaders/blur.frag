@@ -50,11 +50,11 @@ void main() {
       lost[c] += weight[c] * opacity;
       kept[c] += weight[c] * (depth[c] < 1.0 ? 1.0 - opacity : exp(-depth[c]));
       if (kUnscatteredLight) {
-        // What the unscattered light loses or gains by not spreading.
-        float change = (d == 0 ? 1.0 - weight[c] : -weight[c]) *
-                       exp(-blur.density[c] * max(value.a - least[c], 0.0));
-        kept[c] += change;
-        lost[c] -= change;
+        // What unscattered light keeps or loses by not spreading.
+        float stays = d == 0 ? 1.0 - weight[c] : -weight[c];
+        float unscattered = blur.density[c] * max(value.a - least[c], 0.0);
+        lost[c] += stays * OpacityFromOpticalDepth(unscattered);
+        kept[c] += stays * exp(-unscattered);
       }
     }
   }
