@@ -17,6 +17,7 @@ class Mean {
     mean_ += change / static_cast<double>(count_);
     squares_ += change * (value - mean_);
   }
+  [[nodiscard]] size_t count() const { return count_; }
   [[nodiscard]] double value() const { return mean_; }
   [[nodiscard]] double standard_error() const;
 
