@@ -81,7 +81,7 @@ bool Holds(const v1::EstimatedFigure& figure, double truth) {
   return figure.low() <= truth && truth <= figure.high();
 }
 
-TEST_F(MeasuredError, OfThePlumeHoldsTheTrueOne) {
+TEST_F(MeasuredError, IntervalsOfThePlumeHoldTheTrueOne) {
   const Scene scene = Plume();
   ASSERT_NE(scene.particles, nullptr);
   const auto whole =
@@ -93,22 +93,29 @@ TEST_F(MeasuredError, OfThePlumeHoldsTheTrueOne) {
   EXPECT_EQ(whole.header.error().sampled_pixels(), truth.covered);
   EXPECT_NEAR(whole.header.error().relative_rmse().value(), truth.relative_rmse, 1e-9);
 
+  // Of a hundred intervals five miss: three of eight do once in two hundred times.
+  constexpr uint64_t kSeeds = 8;
+  constexpr int kLeastHolding = 6;
   v1::RenderFrameRequest request = RequestOf(scene, {v1::OUTPUT_KIND_BEAUTY});
-  request.mutable_measure_error()->set_seed(5);  // of a hundred seeds, intervals miss with five
-  const auto sampled = Render(request, scene);
-  EXPECT_EQ(FloatsOf(sampled.outputs[0]), beauty) << "measuring does not change the frame";
-  const v1::MeasuredError& error = sampled.header.error();
-  std::cout << "relative RMSE " << truth.relative_rmse << ", measured "
-            << error.relative_rmse().ShortDebugString() << "\n";
-  EXPECT_EQ(error.compared(), v1::COMPARED_FRAME_RETURNED);
-  EXPECT_EQ(error.covered_pixels(), truth.covered);
-  EXPECT_EQ(error.sampled_pixels(), 1024U);
-  EXPECT_TRUE(Holds(error.mean_square_error(), truth.mse));
-  EXPECT_TRUE(Holds(error.bias(), truth.bias));
-  EXPECT_TRUE(Holds(error.rmse(), std::sqrt(truth.mse)));
-  EXPECT_TRUE(Holds(error.relative_rmse(), truth.relative_rmse));
-  EXPECT_LT(error.relative_rmse().high(), 1.5 * error.relative_rmse().low());
-  EXPECT_LE(error.sample_max(), truth.max);
+  int holding[4] = {};
+  for (uint64_t seed = 1; seed <= kSeeds; ++seed) {
+    request.mutable_measure_error()->set_seed(seed);
+    const auto sampled = Render(request, scene);
+    EXPECT_EQ(FloatsOf(sampled.outputs[0]), beauty) << "measuring does not change the frame";
+    const v1::MeasuredError& error = sampled.header.error();
+    std::cout << "relative RMSE " << truth.relative_rmse << ", measured "
+              << error.relative_rmse().ShortDebugString() << "\n";
+    EXPECT_EQ(error.compared(), v1::COMPARED_FRAME_RETURNED);
+    EXPECT_EQ(error.covered_pixels(), truth.covered);
+    EXPECT_EQ(error.sampled_pixels(), 1024U);
+    EXPECT_LT(error.relative_rmse().high(), 1.5 * error.relative_rmse().low());
+    EXPECT_LE(error.sample_max(), truth.max + 1e-6);
+    holding[0] += Holds(error.mean_square_error(), truth.mse) ? 1 : 0;
+    holding[1] += Holds(error.bias(), truth.bias) ? 1 : 0;
+    holding[2] += Holds(error.rmse(), std::sqrt(truth.mse)) ? 1 : 0;
+    holding[3] += Holds(error.relative_rmse(), truth.relative_rmse) ? 1 : 0;
+  }
+  for (const int held : holding) EXPECT_GE(held, kLeastHolding);
 
   // Two ways to the same figures: the map's pixels, and samples of all of them.
   request.mutable_measure_error()->set_samples(1048576);
