@@ -6,6 +6,7 @@
 #include "renderer/frame.h"
 #include "renderer/reference_frame.h"
 #include "renderer/shadow_technique.h"
+#include "renderer/sweep/sweep_frame.h"
 
 namespace halflight {
 
@@ -52,6 +53,9 @@ void DescribePasses(const Scene& scene, FramePlan& plan) {
 absl::StatusOr<FramePlan> PlanFrame(const FrameRequest& request, const ParticleView& particles) {
   const Scene& scene = request.scene;
   if (scene.shadow.technique == ShadowTechniqueKind::kReference) return PlanReferenceFrame(request);
+  if (scene.shadow.technique == ShadowTechniqueKind::kLightSweep) {
+    return PlanSweepFrame(request, particles);
+  }
   if (scene.lights.size() > kMaxLights) {
     return absl::InvalidArgumentError(absl::StrCat("lighting.lights: ", scene.lights.size(),
                                                    " lights, allowed: at most ", kMaxLights));

@@ -95,7 +95,8 @@ struct Material {
 
 enum class ShadowTechniqueKind : uint8_t {
   kHalfAngle,
-  kReference,  // the image model itself, on the CPU
+  kReference,   // the image model itself, on the CPU
+  kLightSweep,  // exact order along each light, fitted over footprints, on the CPU
 };
 enum class SliceSpacing : uint8_t { kEqualCount, kEqualOpticalDepth };
 enum class BlurMode : uint8_t { kDistance, kTexelsPerSlice };
@@ -108,6 +109,8 @@ struct ShadowSettings {
   int light_buffer_size = 512;  // texels along each side
   BlurMode blur_mode = BlurMode::kDistance;
   float blur_texels = 0.0F;  // with kTexelsPerSlice
+  // With kLightSweep: of the polynomial in which a particle keeps the light over its footprint, 0 to 6.
+  int fit_degree = 3;
 };
 
 // At most one of the two differs from 1.
