@@ -109,7 +109,8 @@ struct ShadowSettings {
   int light_buffer_size = 512;  // texels along each side
   BlurMode blur_mode = BlurMode::kDistance;
   float blur_texels = 0.0F;  // with kTexelsPerSlice
-  // With kLightSweep: of the polynomial in which a particle keeps the light over its footprint, 0 to 6.
+  // With kLightSweep: of the polynomial in which a particle keeps the light over its footprint, 0
+  // to 6.
   int fit_degree = 3;
 };
 

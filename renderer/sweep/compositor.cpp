@@ -24,8 +24,7 @@ void WriteTile(const std::array<const float*, 4>& planes, const glm::ivec2& corn
   const int rows = std::min(kImageTile, image.height - corner.y);
   const int columns = std::min(kImageTile, image.width - corner.x);
   for (int row = 0; row < rows; ++row) {
-    float* out =
-        &image.pixels[(static_cast<size_t>(corner.y + row) * image.width + corner.x) * 4];
+    float* out = &image.pixels[(static_cast<size_t>(corner.y + row) * image.width + corner.x) * 4];
     for (int i = row * kImageTile; i < row * kImageTile + columns; ++i) {
       for (const float* plane : planes) *out++ = plane != nullptr ? plane[i] : 0.0F;
     }

@@ -21,9 +21,9 @@ struct Sprite {
   float optical_depth = 0.0F;  // at its centre
 };
 
-// Polynomials in scaled coordinates (x, y) are arrays of coefficients: for a = 0 to the degree those
-// of x^a y^0, x^a y^1 up to the degree.
-inline constexpr int kMaxDegree = 4;
+// Polynomials in scaled coordinates (x, y) are arrays of coefficients: for a = 0 to the degree
+// those of x^a y^0, x^a y^1 up to the degree.
+inline constexpr int kMaxDegree = 6;
 constexpr int Terms(int degree) { return (degree + 1) * (degree + 2) / 2; }
 
 // Where a target's pixels lie on its plane: pixel centre (i + 1/2) * step + first.
@@ -91,13 +91,13 @@ struct ShadedSprites {
   // of the centre, the radius, nothing. Null: not wanted.
   const float* depth = nullptr;
   int lights = 0;
-  int exponents = 1;                // a light: one, or three for coloured density
-  bool clamp_exponents = true;      // none is below 0
+  int exponents = 1;            // a light: one, or three for coloured density
+  bool clamp_exponents = true;  // none is below 0
   int degree = 0;
-  const Rgb* lit = nullptr;         // a sprite and light
-  const float* exponent = nullptr;  // a sprite, light and exponent: Terms(degree) coefficients
-  const NearSprite* near = nullptr;         // a sprite; null: there are none
-  const NearLight* near_lights = nullptr;   // a sprite and light
+  const Rgb* lit = nullptr;          // a sprite and light
+  const float* exponent = nullptr;   // a sprite, light and exponent: Terms(degree) coefficients
+  const NearSprite* near = nullptr;  // a sprite; null: there are none
+  const NearLight* near_lights = nullptr;  // a sprite and light
 };
 
 // Planes of kImageTile^2 floats.
@@ -107,7 +107,7 @@ struct ImageTileJob {
   ShadedSprites shaded;
   const uint32_t* entries = nullptr;  // sprites, nearest the eye first
   uint32_t entry_count = 0;
-  int first_row = 0;  // of the tile in the image
+  int first_row = 0;                 // of the tile in the image
   float least_transmittance = 0.0F;  // stop where all pixels are below
   float* pixels = nullptr;           // out: red, green, blue, coverage
   float* depth = nullptr;            // out: sum of depth times what is seen of a particle, or null

@@ -32,8 +32,7 @@ void SweepLightTile(const LightTileJob& job) {
       Floats weights[kDegree + 1] = {};  // times x^a
       Floats depths[kDegree + 1] = {};
       for (int column = entry.x_begin & ~(kLanes - 1); column < entry.x_end; column += kLanes) {
-        const Floats px =
-            job.grid.first_x + (lanes + static_cast<float>(column)) * job.grid.step_x;
+        const Floats px = job.grid.first_x + (lanes + static_cast<float>(column)) * job.grid.step_x;
         const Floats sx = (px - sprite.x) * sprite.scale;
         Floats rho_squared = sx * sx + sy * sy;
         if (!kOrthographic) {
@@ -156,8 +155,7 @@ HALFLIGHT_INLINE TileRays RaysOf(const PixelGrid& grid) {
   rays.px = grid.first_x + LaneCenters() * grid.step_x;
   for (int row = 0; row < kImageTile; ++row) {
     rays.py[row] = grid.first_y + (static_cast<float>(row) + 0.5F) * grid.step_y;
-    rays.inverse_length[row] =
-        1.0F / (rays.px * rays.px + (rays.py[row] * rays.py[row] + 1.0F));
+    rays.inverse_length[row] = 1.0F / (rays.px * rays.px + (rays.py[row] * rays.py[row] + 1.0F));
   }
   return rays;
 }
@@ -192,8 +190,7 @@ HALFLIGHT_INLINE void CompositeSprite(const ImageTileJob& job, uint32_t i, const
       const Floats turn = sprite.x * y - sprite.y * x;
       rho_squared = (rho_squared + turn * turn) * rays.inverse_length[row];
     }
-    const Floats alpha =
-        OpacityOf(sprite.optical_depth * WeightAt(rho_squared, job.shape.ball));
+    const Floats alpha = OpacityOf(sprite.optical_depth * WeightAt(rho_squared, job.shape.ball));
     Floats depth{};
     if (extras.depth != nullptr) {
       const float* const d = shaded.depth + 3 * static_cast<size_t>(i);
@@ -234,8 +231,8 @@ template <bool kColored, int kDegree>
     const Floats oy = (mz * px + mx) * inverse;
     const Floats oz = (mx * py - my * px) * inverse;
     const Floats along = c[0] * px + (c[1] * py - c[2]);
-    Floats alpha = OpacityOf(shaded.sprites[i].optical_depth *
-                             WeightAt(rho_squared, job.shape.ball));
+    Floats alpha =
+        OpacityOf(shaded.sprites[i].optical_depth * WeightAt(rho_squared, job.shape.ball));
     alpha = along > 0.0F ? alpha : Floats{};
     Floats depth{};
     if (extras.depth != nullptr) {
@@ -337,14 +334,15 @@ void CompositeAtDegree(const ImageTileJob& job) {
 
 void Sweep(const LightTileJob& job) {
   constexpr void (*kByDegree[])(const LightTileJob&) = {
-      SweepAtDegree<0>, SweepAtDegree<1>, SweepAtDegree<2>, SweepAtDegree<3>, SweepAtDegree<4>};
+      SweepAtDegree<0>, SweepAtDegree<1>, SweepAtDegree<2>, SweepAtDegree<3>,
+      SweepAtDegree<4>, SweepAtDegree<5>, SweepAtDegree<6>};
   kByDegree[job.degree](job);
 }
 
 void CompositeTile(const ImageTileJob& job) {
-  constexpr void (*kByDegree[])(const ImageTileJob&) = {CompositeAtDegree<0>, CompositeAtDegree<1>,
-                                                        CompositeAtDegree<2>, CompositeAtDegree<3>,
-                                                        CompositeAtDegree<4>};
+  constexpr void (*kByDegree[])(const ImageTileJob&) = {
+      CompositeAtDegree<0>, CompositeAtDegree<1>, CompositeAtDegree<2>, CompositeAtDegree<3>,
+      CompositeAtDegree<4>, CompositeAtDegree<5>, CompositeAtDegree<6>};
   kByDegree[job.shaded.degree](job);
 }
 

@@ -23,9 +23,9 @@ struct LightFit {
   Image optical_depth;          // behind all particles; Y
 };
 
-// `degree` 0 to kMaxDegree. Deposits the particles nearest the light first, each as the light buffer's texels
-// show it, and fits to the texels it covers what lay before. Cancelled when `stop` says so. Any
-// thread; uses all cores.
+// `degree` 0 to kMaxDegree. Deposits the particles nearest the light first, each as the light
+// buffer's texels show it, and fits to the texels it covers what lay before. Cancelled when `stop`
+// says so. Any thread; uses all cores.
 absl::StatusOr<LightFit> FitLight(const Light& light, const ParticleView& particles,
                                   Profile profile, int light_buffer_size, int degree,
                                   const std::stop_token& stop);

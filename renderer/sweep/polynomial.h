@@ -13,11 +13,10 @@
 namespace halflight::sweep {
 
 // Where the coefficient of x^a y^b stands.
-constexpr int TermIndex(int degree, int a, int b) {
-  return a * (degree + 1) - a * (a - 1) / 2 + b;
-}
+constexpr int TermIndex(int degree, int a, int b) { return a * (degree + 1) - a * (a - 1) / 2 + b; }
 
-// q(x, y) = factor * p(u, v), where u = x along.x.x + y along.y.x ... : (u, v) = x * of_x + y * of_y.
+// q(x, y) = factor * p(u, v), where u = x along.x.x + y along.y.x ... : (u, v) = x * of_x + y *
+// of_y.
 void Substitute(int degree, std::span<const float> p, const glm::dvec2& of_x,
                 const glm::dvec2& of_y, double factor, std::span<float> q);
 

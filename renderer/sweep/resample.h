@@ -8,8 +8,9 @@
 
 namespace halflight::sweep {
 
-// As shaders/resolve.frag does: the mean of n x n samples, or bilinear interpolation between samples
-// n pixels apart. `samples` is R G B A, premultiplied; itself where sampling asks for nothing.
+// As shaders/resolve.frag does: the mean of n x n samples, or bilinear interpolation between
+// samples n pixels apart. `samples` is R G B A, premultiplied; itself where sampling asks for
+// nothing.
 Image Resample(Image samples, const Sampling& sampling, const glm::ivec2& size);
 
 }  // namespace halflight::sweep

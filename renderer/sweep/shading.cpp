@@ -18,8 +18,8 @@ static_assert(kMaxTileLights >= 2 * kMaxLights);
 
 using Coefficients = std::array<float, Terms(kMaxDegree)>;
 
-// Offsets from the centre in radii (view axes) for which scaled coordinates (1, 0) and (0, 1) stand,
-// to first order: offsets are perpendicular to the ray through the centre.
+// Offsets from the centre in radii (view axes) for which scaled coordinates (1, 0) and (0, 1)
+// stand, to first order: offsets are perpendicular to the ray through the centre.
 struct Footprint {
   glm::dvec3 x{1.0, 0.0, 0.0};
   glm::dvec3 y{0.0, 1.0, 0.0};
@@ -41,8 +41,8 @@ double PhaseFunction(double g, double cosine) {
   return (1.0 - g * g) / (d * std::sqrt(d));
 }
 
-// Radiance that a light would have at `at` for a ray along `ray` (both view axes, `at` from the eye),
-// relative to its colour.
+// Radiance that a light would have at `at` for a ray along `ray` (both view axes, `at` from the
+// eye), relative to its colour.
 class RadianceFactor {
  public:
   RadianceFactor(const Light& light, const Material& material, const glm::dmat4& view_from_world)
@@ -185,10 +185,9 @@ Shading ShadeSprites(const Scene& scene, const ParticleView& particles, const Pr
     shading.exponents = source.colored_density() && light.fit != nullptr ? 3 : shading.exponents;
     shading.clamp_exponents &= !light.varies;
     factors.emplace_back(source, material, eye.view_from_world);
-    rotations.push_back(light.fit == nullptr
-                            ? glm::dmat3(1.0)
-                            : glm::dmat3(light.fit->projection.view_from_world) *
-                                  glm::transpose(glm::dmat3(eye.view_from_world)));
+    rotations.push_back(light.fit == nullptr ? glm::dmat3(1.0)
+                                             : glm::dmat3(light.fit->projection.view_from_world) *
+                                                   glm::transpose(glm::dmat3(eye.view_from_world)));
   }
   for (size_t l = 0; l < scene.lights.size(); ++l) {
     if (fits[l] == nullptr && !Varies(scene.lights[l], material)) constant += scene.lights[l].color;
@@ -213,8 +212,8 @@ Shading ShadeSprites(const Scene& scene, const ParticleView& particles, const Pr
       shading.rows[2 * place + 1] = list.rects[place].y_end;
       const glm::vec3 albedo =
           set.colors.empty() ? material.albedo : material.albedo * set.colors[i];
-      shading.unshadowed[place] = ToRgb(
-          albedo * constant + (set.emissions.empty() ? material.emission : set.emissions[i]));
+      shading.unshadowed[place] =
+          ToRgb(albedo * constant + (set.emissions.empty() ? material.emission : set.emissions[i]));
 
       const double radius = particles.radius(i);
       const Footprint footprint = FootprintOf(sprite, eye.orthographic);
@@ -271,10 +270,9 @@ Shading ShadeSprites(const Scene& scene, const ParticleView& particles, const Pr
               narrow(axes.x, shading.near_lights[place * lights + l].x);
               narrow(axes.y, shading.near_lights[place * lights + l].y);
             } else {
-              Substitute(degree, depth,
-                         {glm::dot(axes.x, footprint.x), glm::dot(axes.y, footprint.x)},
-                         {glm::dot(axes.x, footprint.y), glm::dot(axes.y, footprint.y)}, density,
-                         out);
+              Substitute(
+                  degree, depth, {glm::dot(axes.x, footprint.x), glm::dot(axes.y, footprint.x)},
+                  {glm::dot(axes.x, footprint.y), glm::dot(axes.y, footprint.y)}, density, out);
             }
           }
           for (size_t t = 0; t < terms; ++t) out[t] += varying[t];

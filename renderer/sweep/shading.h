@@ -15,10 +15,10 @@ namespace halflight::sweep {
 
 // A light among those that the kernels add up.
 struct TileLight {
-  int light = 0;              // of the scene
+  int light = 0;                  // of the scene
   const LightFit* fit = nullptr;  // null: it casts no shadows
-  bool varies = false;        // its radiance does, with place or ray
-  bool adds = true;           // false: there only for its transmittance
+  bool varies = false;            // its radiance does, with place or ray
+  bool adds = true;               // false: there only for its transmittance
 };
 
 // Owns what ShadedSprites points to, but for the sprites.

@@ -1,10 +1,9 @@
-// Eight floats at a time, by the compiler's vector extension: AVX where the file is compiled for it,
-// pairs of SSE or NEON registers elsewhere. Only what the sweep's kernels need.
+// Eight floats at a time, by the compiler's vector extension: AVX where the file is compiled for
+// it, pairs of SSE or NEON registers elsewhere. Only what the sweep's kernels need.
 #pragma once
 
 #include <cstdint>
 #include <cstring>
-
 
 namespace halflight::simd {
 
@@ -40,7 +39,8 @@ HALFLIGHT_INLINE float Sum(const Floats& x) {
   return ((x[0] + x[4]) + (x[1] + x[5])) + ((x[2] + x[6]) + (x[3] + x[7]));
 }
 
-// 2^n and f q(f), of which exp(-x) = 2^n (1 + f q(f)); x >= 0. The polynomial is 2^f - 1 on
+// 2^n and f q(f), of which exp(-x) = 2^n (1 + f q(f)), for x in [-41, 87] and these bounds beyond:
+// so much that nothing overflows where it is multiplied by 0. The polynomial is 2^f - 1 on
 // [-1/2, 1/2], its Taylor series to degree 7, whose rest is below 6e-9.
 struct ExpParts {
   Floats power;
@@ -49,7 +49,7 @@ struct ExpParts {
 HALFLIGHT_INLINE ExpParts SplitExpOfMinus(const Floats& x) {
   constexpr float kLog2E = 1.44269504F;
   constexpr float kRound = 12582912.0F;  // 1.5 * 2^23: adding it rounds to whole numbers
-  const Floats t = Max(x * -kLog2E, All(-126.0F));
+  const Floats t = Min(Max(x * -kLog2E, All(-126.0F)), All(60.0F));
   const Floats shifted = t + kRound;
   const Floats whole = shifted - kRound;
   const Floats f = (t - whole) * 0.693147181F;
@@ -66,7 +66,7 @@ HALFLIGHT_INLINE ExpParts SplitExpOfMinus(const Floats& x) {
   return {power, f * q};
 }
 
-// exp(-x), x >= 0; 2^-126 stands for all that is smaller.
+// exp(-x), from 2^-126 to 2^60.
 HALFLIGHT_INLINE Floats ExpOfMinus(const Floats& x) {
   const ExpParts parts = SplitExpOfMinus(x);
   return parts.power * parts.fraction + parts.power;

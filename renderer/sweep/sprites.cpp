@@ -62,8 +62,8 @@ SpriteList ListSprites(const ParticleView& particles, const Projection& target) 
   ParallelRanges(count, [&](const WorkRange& range) {
     for (size_t i = range.begin; i < range.end; ++i) {
       const glm::dvec3 view = view_of(i);
-      keys[i] = OrderedKey(
-          static_cast<float>(target.orthographic ? -view.z : glm::dot(view, view)));
+      keys[i] =
+          OrderedKey(static_cast<float>(target.orthographic ? -view.z : glm::dot(view, view)));
     }
   });
   SpriteList list;
@@ -95,11 +95,12 @@ SpriteList ListSprites(const ParticleView& particles, const Projection& target) 
       } else if (w > 1.0005 * radius) {
         list.sprites[place] = {static_cast<float>(view.x / w), static_cast<float>(view.y / w),
                                static_cast<float>(w / radius), static_cast<float>(optical_depth)};
-        list.rects[place] = RectOf(target, TangentSlopes(view.x, w, radius),
-                                   TangentSlopes(view.y, w, radius));
+        list.rects[place] =
+            RectOf(target, TangentSlopes(view.x, w, radius), TangentSlopes(view.y, w, radius));
       } else if (w > -radius) {
         list.sprites[place] = {0.0F, 0.0F, 0.0F, static_cast<float>(optical_depth)};
-        list.near[place] = {{static_cast<float>(view.x / radius), static_cast<float>(view.y / radius),
+        list.near[place] = {{static_cast<float>(view.x / radius),
+                             static_cast<float>(view.y / radius),
                              static_cast<float>(view.z / radius)}};
         list.rects[place] =
             RectOf(target, VisibleSlopes(view.x, w, radius), VisibleSlopes(view.y, w, radius));

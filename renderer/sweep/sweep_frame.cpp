@@ -53,9 +53,9 @@ absl::StatusOr<FramePlan> PlanSweepFrame(const FrameRequest& request,
   const Scene& scene = request.scene;
   FramePlan plan;
   plan.window_size = {scene.camera.window.width, scene.camera.window.height};
-  plan.composite_size = (plan.window_size * scene.sampling.supersample +
-                         (scene.sampling.downsample - 1)) /
-                        scene.sampling.downsample;
+  plan.composite_size =
+      (plan.window_size * scene.sampling.supersample + (scene.sampling.downsample - 1)) /
+      scene.sampling.downsample;
   plan.keep_depth = Shows(request, ImageKind::kDepth);
   for (size_t l = 0; l < scene.lights.size(); ++l) {
     if (!scene.lights[l].casts_shadows()) continue;
@@ -115,8 +115,8 @@ absl::StatusOr<DrawnImages> DrawSweepFrame(const FrameRequest& request,
       sweep::ShadeSprites(scene, particles, eye, list, fit_of, scene.shadow.fit_degree,
                           plan.keep_depth, keep_transmittance);
   clock.BeginCpu("composite");
-  absl::StatusOr<sweep::Composite> composite = sweep::CompositeTiles(
-      list, shading, eye, scene.material.profile, keep_transmittance, stop);
+  absl::StatusOr<sweep::Composite> composite =
+      sweep::CompositeTiles(list, shading, eye, scene.material.profile, keep_transmittance, stop);
   if (!composite.ok()) return composite.status();
 
   const auto resample = [&](Image image) {

@@ -18,8 +18,8 @@ namespace halflight {
 absl::StatusOr<FramePlan> PlanSweepFrame(const FrameRequest& request,
                                          const ParticleView& particles);
 
-// What a request that PlanSweepFrame took shows; fills in the reports, one for each light. Cancelled
-// soon after `stop` was requested. Uses all cores.
+// What a request that PlanSweepFrame took shows; fills in the reports, one for each light.
+// Cancelled soon after `stop` was requested. Uses all cores.
 absl::StatusOr<DrawnImages> DrawSweepFrame(const FrameRequest& request,
                                            const ParticleView& particles, const FramePlan& plan,
                                            StageClock& clock, const std::stop_token& stop,

@@ -10,7 +10,8 @@
 
 namespace halflight::sweep {
 
-// Calls `work` once for each of [0, count); false when `stop` ended it early. `work` must not throw.
+// Calls `work` once for each of [0, count); false when `stop` ended it early. `work` must not
+// throw.
 template <typename Work>
 bool ForTiles(size_t count, const std::stop_token& stop, const Work& work) {
   std::atomic<size_t> next = 0;
