@@ -3,9 +3,8 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <limits>
 #include <utility>
-
-#include <glm/common.hpp>
 
 #include "absl/status/status.h"
 #include "absl/strings/str_cat.h"
@@ -16,15 +15,18 @@ namespace halflight {
 
 namespace {
 
-constexpr double kCovered = 0.01;
 constexpr int kLeastSamples = 32;
-constexpr size_t kWorstPixels = 8;
 
 struct CoveredPixels {
   std::vector<glm::ivec2> places;
   std::vector<glm::dvec3> colors;
   std::vector<double> expected_error;  // in any unit
 };
+
+// What is no number is as wrong as can be, and has to have a place in an order.
+double SizeOf(double error) {
+  return std::isnan(error) ? std::numeric_limits<double>::infinity() : std::abs(error);
+}
 
 double MeanOf(const glm::dvec3& color) { return (color.x + color.y + color.z) / 3.0; }
 
@@ -42,8 +44,9 @@ CoveredPixels FindCovered(const Image& beauty) {
       if (!(rgba[3] > kCovered)) continue;
       covered.places.emplace_back(x, y);
       covered.colors.emplace_back(rgba[0], rgba[1], rgba[2]);
-      covered.expected_error.push_back(
-          std::sqrt(std::max(0.0, MeanOf(covered.colors.back())) * static_cast<double>(rgba[3])));
+      const double expected =
+          std::sqrt(std::max(0.0, MeanOf(covered.colors.back())) * static_cast<double>(rgba[3]));
+      covered.expected_error.push_back(std::isfinite(expected) ? expected : 0.0);
       sum += covered.expected_error.back();
     }
   }
@@ -87,7 +90,12 @@ void FillMeans(std::span<const Stratum> strata, std::span<const PixelError> erro
   const double half = LogHalf(square, square.mean);
   result.mean_square_error = LogInterval(square.mean, half);
   result.rmse = LogInterval(std::sqrt(square.mean), 0.5 * half);
-  if (!(square.mean > 0.0 && result.reference_mean > 0.0)) return;
+  if (square.mean == 0.0) return;
+  if (result.reference_mean == 0.0) {
+    constexpr double kInfinity = std::numeric_limits<double>::infinity();
+    result.relative_rmse = {kInfinity, kInfinity, kInfinity};
+    return;
+  }
 
   // The logarithm of the ratio, to first order, is the mean of this (Cochran 6.12).
   std::vector<double> linear(count);
@@ -102,7 +110,7 @@ void FillExtremes(std::vector<PixelError> errors, ErrorEstimate& result) {
   std::vector<double> absolute;
   for (const PixelError& error : errors) {
     for (int channel = 0; channel < 3; ++channel) {
-      absolute.push_back(std::abs(error.error[channel]));
+      absolute.push_back(SizeOf(error.error[channel]));
     }
   }
   std::sort(absolute.begin(), absolute.end());
@@ -127,7 +135,7 @@ absl::StatusOr<ErrorEstimate> EstimateError(const Image& beauty, const Reference
   const CoveredPixels covered = FindCovered(beauty);
   ErrorEstimate result;
   result.covered_pixels = covered.places.size();
-  if (covered.places.empty()) return result;
+  if (covered.places.empty()) return result;  // there is nothing to divide by
 
   const std::vector<Stratum> strata = DrawStrata(
       covered.expected_error, static_cast<size_t>(options.samples) / 2 * 2, options.seed);
@@ -145,8 +153,8 @@ absl::StatusOr<ErrorEstimate> EstimateError(const Image& beauty, const Reference
     for (const uint32_t drawn : stratum.drawn) {
       const glm::dvec3 expected((*exact)[errors.size()]);
       const glm::dvec3 error = covered.colors[drawn] - expected;
-      const glm::dvec3 size = glm::abs(error);
-      errors.push_back({covered.places[drawn], error, std::max({size.x, size.y, size.z})});
+      errors.push_back({covered.places[drawn], error,
+                        std::max({SizeOf(error.x), SizeOf(error.y), SizeOf(error.z)})});
       reference_means.push_back(MeanOf(expected));
     }
   }

@@ -1,6 +1,6 @@
 // How far a frame is from the image model, from the model's values at a few hundred random pixels.
 // No GL. The model has no scattering: of a scene that has it, hand in the frame without, and say
-// that this is what was compared.
+// that this is what was compared. The error at every pixel is error_map.h's.
 #pragma once
 
 #include <cstddef>
@@ -19,6 +19,9 @@
 #include "renderer/scene.h"
 
 namespace halflight {
+
+// Errors are of the pixels that the frame covers by more than this.
+inline constexpr double kCovered = 0.01;
 
 struct ErrorEstimateOptions {
   // Pixels at which the model is evaluated: at least 32, taken as even. With the default intervals
@@ -42,22 +45,27 @@ struct PixelError {
   double largest = 0.0;   // of their absolute values
 };
 
-// Over R, G and B, premultiplied and linear, of the pixels that the frame covers by more than 0.01.
+// Over R, G and B, premultiplied and linear, of the covered pixels; all zero where there are none.
+// Where all of them are sampled nothing is left to chance: the figures are those of the image, and
+// their intervals have no width. A frame that is not finite has errors that are not finite.
 struct ErrorEstimate {
   size_t covered_pixels = 0;
   size_t sampled_pixels = 0;          // all of the covered ones where these are few
   EstimatedFigure mean_square_error;  // unbiased, as is the next
   EstimatedFigure bias;               // mean of frame minus reference
   EstimatedFigure rmse;
-  EstimatedFigure relative_rmse;  // to the mean of the reference over the same pixels
-  double reference_mean = 0.0;    // an estimate too, and unbiased
+  // To the mean of the reference over the same pixels: infinite where that is 0 and the RMSE is
+  // not.
+  EstimatedFigure relative_rmse;
+  double reference_mean = 0.0;  // an estimate too, and unbiased
   // Of the sample alone, not of the image: the 99.9th percentile and the largest of the absolute
   // errors of a channel, and the pixels where they are largest, worst first.
   double sample_p999 = 0.0;
   double sample_max = 0.0;
-  std::vector<PixelError> sample_worst;
+  std::vector<PixelError> sample_worst;  // kWorstPixels of them, or fewer where the sample is small
   double milliseconds = 0.0;
 };
+inline constexpr size_t kWorstPixels = 8;
 
 // R G B A of the model at pixels of the image, one for each.
 using ReferenceAt =

@@ -87,6 +87,7 @@ Image SelectImage(const ImageRequest& request, const Scene& scene, const DrawnIm
   const auto light = static_cast<size_t>(request.light_index);
   switch (request.kind) {
     case ImageKind::kBeauty:
+    case ImageKind::kError:  // refused by PlanFrame
       break;
     case ImageKind::kCoverage:
       return CoverageOf(drawn.beauty);

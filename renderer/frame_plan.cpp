@@ -40,10 +40,13 @@ void DescribePasses(const Scene& scene, FramePlan& plan) {
       plan.passes.push_back({"composite", "the image", 1});
     }
   }
-  if (scene.sampling.supersample > 1) {
+}
+
+void DescribeSampling(const Sampling& sampling, FramePlan& plan) {
+  if (sampling.supersample > 1) {
     plan.passes.push_back({"average samples", "supersample above 1", 1});
   }
-  if (scene.sampling.downsample > 1) {
+  if (sampling.downsample > 1) {
     plan.passes.push_back({"enlarge samples", "downsample above 1", 1});
   }
 }
@@ -52,10 +55,13 @@ void DescribePasses(const Scene& scene, FramePlan& plan) {
 
 absl::StatusOr<FramePlan> PlanFrame(const FrameRequest& request, const ParticleView& particles) {
   const Scene& scene = request.scene;
-  if (scene.shadow.technique == ShadowTechniqueKind::kReference) return PlanReferenceFrame(request);
-  if (scene.shadow.technique == ShadowTechniqueKind::kLightSweep) {
-    return PlanSweepFrame(request, particles);
+  for (const ImageRequest& image : request.images) {
+    if (image.kind == ImageKind::kError) {
+      return absl::InvalidArgumentError(
+          "outputs: error, allowed of the renderer: what is drawn; the error is made of a beauty");
+    }
   }
+  if (scene.shadow.technique == ShadowTechniqueKind::kReference) return PlanReferenceFrame(request);
   if (scene.lights.size() > kMaxLights) {
     return absl::InvalidArgumentError(absl::StrCat("lighting.lights: ", scene.lights.size(),
                                                    " lights, allowed: at most ", kMaxLights));
@@ -65,6 +71,11 @@ absl::StatusOr<FramePlan> PlanFrame(const FrameRequest& request, const ParticleV
   plan.composite_size = CompositeSize(scene.camera.window, scene.sampling);
   for (const ImageRequest& image : request.images) {
     plan.keep_depth |= image.kind == ImageKind::kDepth;
+  }
+  if (scene.shadow.technique == ShadowTechniqueKind::kLightSweep) {
+    if (absl::Status status = PlanSweepFrame(request, particles, plan); !status.ok()) return status;
+    DescribeSampling(scene.sampling, plan);
+    return plan;
   }
 
   // One traversal for each light that casts shadows: each has an axis of its own.
@@ -87,6 +98,7 @@ absl::StatusOr<FramePlan> PlanFrame(const FrameRequest& request, const ParticleV
   plan.traversals.front().unshadowed_lights = std::move(unshadowed);
 
   DescribePasses(scene, plan);
+  DescribeSampling(scene.sampling, plan);
   return plan;
 }
 

@@ -24,6 +24,7 @@ enum class ImageKind : uint8_t {
   kLightTransmittance,  // Y or R G B; 1 where nothing is covered
   kLightBuffer,         // Y or R G B
   kLightLayers,         // as kLightBuffer, one layer a slice
+  kError,               // R G B; of a beauty that is there: error_map.h, not the renderer, makes it
 };
 
 enum class LightQuantity : uint8_t { kTransmittance, kOpticalDepth };

@@ -77,6 +77,7 @@ Image SelectImage(const ImageRequest& request, const Scene& scene,
     case ImageKind::kBeauty:
     case ImageKind::kLightBuffer:
     case ImageKind::kLightLayers:
+    case ImageKind::kError:
       break;
   }
   return MakeImage(window, {"R", "G", "B", "A"},

@@ -3,6 +3,7 @@
 // valid: whoever fills these structs has checked them (the service does so in server/convert).
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -112,12 +113,16 @@ struct ShadowSettings {
   // With kLightSweep: of the polynomial in which a particle keeps the light over its footprint, 0
   // to 6.
   int fit_degree = 3;
+
+  bool operator==(const ShadowSettings&) const = default;
 };
 
 // At most one of the two differs from 1.
 struct Sampling {
   int supersample = 1;  // n x n samples a pixel
   int downsample = 1;   // one sample for n x n pixels
+
+  bool operator==(const Sampling&) const = default;
 };
 
 struct Scene {
@@ -128,6 +133,15 @@ struct Scene {
   Material material;
   ShadowSettings shadow;
   Sampling sampling;
+
+  // Whether light spreads sideways where it shows: in shadows.
+  [[nodiscard]] bool scatters() const {
+    const bool spreads = shadow.blur_mode == BlurMode::kTexelsPerSlice
+                             ? shadow.blur_texels > 0.0F
+                             : material.scattering_spread > 0.0F;
+    return spreads && std::any_of(lights.begin(), lights.end(),
+                                  [](const Light& light) { return light.casts_shadows(); });
+  }
 };
 
 }  // namespace halflight

@@ -39,7 +39,7 @@ void AppendOutcome(std::string& line, const absl::Status& outcome) {
 }  // namespace
 
 std::string FrameLogLine(const FrameJob& job, const std::vector<StageTiming>& timings,
-                         const absl::Status& outcome) {
+                         const std::optional<ErrorEstimate>& error, const absl::Status& outcome) {
   const Scene& scene = job.request.scene;
   std::string line = fmt::format(
       "frame request_id={} technique={} particles={} size={}x{} outputs={}", Quoted(job.request_id),
@@ -49,6 +49,9 @@ std::string FrameLogLine(const FrameJob& job, const std::vector<StageTiming>& ti
   for (const StageTiming& timing : timings) {
     fmt::format_to(std::back_inserter(line), " {}_ms={:.2f}", Key(timing.stage),
                    timing.milliseconds);
+  }
+  if (error.has_value()) {
+    fmt::format_to(std::back_inserter(line), " relative_rmse={:.4g}", error->relative_rmse.value);
   }
   AppendOutcome(line, outcome);
   return line;

@@ -1,5 +1,6 @@
-// A frame's way through the server: rendered on the engine's thread, its outputs encoded and hashed
-// on others, and handed over complete. Does not send anything and knows no clients.
+// A frame's way through the server: rendered on the engine's thread, its error measured where that
+// is asked for and its outputs encoded and hashed on others, and handed over complete. Does not
+// send anything and knows no clients.
 #pragma once
 
 #include <condition_variable>
@@ -17,6 +18,7 @@
 #include "renderer/frame_engine.h"
 #include "server/convert/convert_frame.h"
 #include "server/encode/encode.h"
+#include "server/frame_measurement.h"
 #include "server/worker_pool.h"
 
 namespace halflight {
@@ -36,6 +38,10 @@ struct PipelineOptions {
   std::function<absl::StatusOr<EncodedImage>(const Image&, ImageKind, LightQuantity,
                                              const EncodeSettings&, const ImageMetadata&)>
       encode = EncodeImage;
+  // What holds a beauty against the image model; one thread of the pipeline, one frame at a time.
+  std::function<absl::StatusOr<FrameError>(const Image&, const Scene&, const MeasureJob&,
+                                           const std::stop_token&)>
+      measure = MeasureFrame;
 };
 
 class FramePipeline {
@@ -60,11 +66,21 @@ class FramePipeline {
 
  private:
   struct Flight;
+  using FlightPtr = std::shared_ptr<Flight>;
+  using Stage = void (FramePipeline::*)(const FlightPtr& flight, FrameResult result);
 
   absl::Status Admit();
-  void OnRendered(const std::shared_ptr<Flight>& flight, absl::StatusOr<FrameResult> result);
-  void EncodeOutput(const std::shared_ptr<Flight>& flight, size_t index);
-  void Complete(const std::shared_ptr<Flight>& flight);
+
+  // The stages in their order. Each hands the flight on, or over to Fail, and touches it no more.
+  absl::Status Render(const FlightPtr& flight, FrameRequest request, Stage next);
+  void OnRendered(const FlightPtr& flight, FrameResult result);
+  void OnRenderedToCompare(const FlightPtr& flight, FrameResult result);
+  void Measure(const FlightPtr& flight, const Image& beauty);
+  void Encode(const FlightPtr& flight);
+  void EncodeOutput(const FlightPtr& flight, size_t index);
+  void Complete(const FlightPtr& flight);
+
+  void Fail(const FlightPtr& flight, absl::Status status);
 
   FrameEngine& engine_;
   const PipelineOptions options_;
@@ -76,6 +92,9 @@ class FramePipeline {
   uint64_t next_id_ = 0;
 
   WorkerPool workers_;
+  // One: a measurement has all cores to itself, but for what renders and encodes meanwhile. Posts
+  // to the workers, so it ends before them.
+  WorkerPool measurer_{1};
 };
 
 }  // namespace halflight

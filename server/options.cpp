@@ -73,7 +73,8 @@ void AddFlags(CLI::App& app, Options& options) {
   bytes("--max-output-bytes", limits.max_output_bytes,
         "Pixels of all outputs of a frame, in bytes of 32-bit float");
   number("--max-reference-work", limits.max_reference_work,
-         "Samples times particles of a frame of technique REFERENCE");
+         "Samples times particles of which a frame's exact image is evaluated: as technique "
+         "REFERENCE, and to measure errors");
   number("--max-queued-frames", limits.max_queued_frames,
          "Frames waiting, rendering or encoding, of all clients together");
   bytes("--max-message-bytes", limits.max_message_bytes, "Largest message received");

@@ -17,13 +17,14 @@ struct NamedOutput {
   const char* name;
   v1::OutputKind kind;
 };
-constexpr std::array<NamedOutput, 6> kOutputs = {{
+constexpr std::array<NamedOutput, 7> kOutputs = {{
     {"beauty", v1::OUTPUT_KIND_BEAUTY},
     {"coverage", v1::OUTPUT_KIND_COVERAGE},
     {"depth", v1::OUTPUT_KIND_DEPTH},
     {"transmittance", v1::OUTPUT_KIND_LIGHT_TRANSMITTANCE},
     {"light", v1::OUTPUT_KIND_LIGHT_BUFFER},
     {"layers", v1::OUTPUT_KIND_LIGHT_LAYERS},
+    {"error", v1::OUTPUT_KIND_ERROR},
 }};
 
 absl::Status Unexpected(std::string_view received, std::string_view allowed) {
@@ -176,6 +177,25 @@ absl::StatusOr<LightFlag> ParseLight(std::string_view text) {
   light.kind = is_point ? LightFlag::Kind::kPoint : LightFlag::Kind::kDirection;
   light.value = *value;
   return light;
+}
+
+absl::StatusOr<uint32_t> ParseErrorSamples(std::string_view text) {
+  if (text == "true") {
+    return 0;
+  }
+  const auto samples = ParseCount(text);
+  if (!samples || *samples < 32 || *samples > 1048576) {
+    return Unexpected(text, "a whole number of pixels from 32 to 1048576, or nothing");
+  }
+  return static_cast<uint32_t>(*samples);
+}
+
+absl::StatusOr<uint64_t> ParseSeed(std::string_view text) {
+  const auto seed = ParseCount(text);
+  if (!seed) {
+    return Unexpected(text, "a whole number from 0 to 18446744073709551615");
+  }
+  return *seed;
 }
 
 std::string OutputName(v1::OutputKind kind) {

@@ -30,6 +30,11 @@ absl::StatusOr<OutputFlag> ParseOutput(std::string_view text);
 // "x,y,z" (direction of travel), "point:x,y,z", "camera".
 absl::StatusOr<LightFlag> ParseLight(std::string_view text);
 
+// Of --measure-error=SAMPLES; "true" where no number is given: 0, the server's default.
+absl::StatusOr<uint32_t> ParseErrorSamples(std::string_view text);
+// A whole number from 0 to 2^64 - 1.
+absl::StatusOr<uint64_t> ParseSeed(std::string_view text);
+
 // What an output is called in flags and reports, such as "light"; and all of them, for messages.
 std::string OutputName(v1::OutputKind kind);
 std::string OutputNames();

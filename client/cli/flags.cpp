@@ -69,7 +69,7 @@ void AddOutputFlags(CLI::App& app, RenderOptions& options) {
   AddChoice<v1::ImageFormat>(
       app, "--exr", options.exr_format,
       {{"half", v1::IMAGE_FORMAT_EXR_HALF}, {"float", v1::IMAGE_FORMAT_EXR_FLOAT}},
-      "Numbers in EXRs; default: half, but float for depth and optical depth");
+      "Numbers in EXRs; default: half, but float for depth, optical depth and error");
   AddChoice<v1::ExrCompression>(app, "--exr-compression", options.exr_compression,
                                 {{"none", v1::EXR_COMPRESSION_NONE},
                                  {"rle", v1::EXR_COMPRESSION_RLE},
@@ -176,6 +176,18 @@ void AddShadowFlags(CLI::App& app, RenderOptions& options) {
             "Move particles along their velocities by this many seconds");
 }
 
+void AddErrorFlags(CLI::App& app, RenderOptions& options) {
+  // No value but behind "=": what follows may be the input.
+  Add(app, "--measure-error", options.error_samples, ParseErrorSamples,
+      "Measure how far the frame is from the image model, at 1024 random pixels or at SAMPLES of "
+      "them",
+      "")
+      ->expected(0)
+      ->option_text("[=SAMPLES]");
+  Add(app, "--error-seed", options.error_seed, ParseSeed,
+      "Chooses other random pixels for --measure-error; default: 0", "NUMBER");
+}
+
 }  // namespace
 
 void AddRenderFlags(CLI::App& app, RenderOptions& options) {
@@ -186,7 +198,8 @@ void AddRenderFlags(CLI::App& app, RenderOptions& options) {
   for (const Group& group :
        {Group{"Files", AddFileFlags}, Group{"Storage", AddOutputFlags},
         Group{"Camera", AddCameraFlags}, Group{"Lights", AddLightFlags},
-        Group{"Material", AddMaterialFlags}, Group{"Shadow and sampling", AddShadowFlags}}) {
+        Group{"Material", AddMaterialFlags}, Group{"Shadow and sampling", AddShadowFlags},
+        Group{"Error", AddErrorFlags}}) {
     app.option_defaults()->group(group.name);
     group.add(app, options);
   }

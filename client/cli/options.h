@@ -92,6 +92,10 @@ struct RenderOptions {
   std::optional<uint32_t> downsample;
   std::optional<double> time_offset_s;
 
+  // Its error.
+  std::optional<uint32_t> error_samples;  // measure it, at so many pixels
+  std::optional<uint64_t> error_seed;
+
   // What is said about it.
   std::string request_id;
   bool json = false;

@@ -33,6 +33,43 @@ std::string OutputsJson(const FrameReport& report, const RenderedFrame& frame) {
   return "[" + list + "]";
 }
 
+// "3.21 %".
+std::string Percent(double fraction) { return fmt::format("{:.3g} %", 100.0 * fraction); }
+
+// A line on how far the frame is from the image model, and one on where; a third where another
+// frame stood in for it.
+std::string ErrorText(const v1::MeasuredError& error) {
+  if (error.covered_pixels() == 0) {
+    return "error: none to measure, since no pixel is covered\n";
+  }
+  const bool all = error.sampled_pixels() == error.covered_pixels();
+  const v1::EstimatedFigure& relative = error.relative_rmse();
+  const v1::EstimatedFigure& bias = error.bias();
+  std::string text = fmt::format("error: relative RMSE {}", Percent(relative.value()));
+  if (!all) {
+    text += fmt::format(" ({} to {} with 95 % confidence)", Percent(relative.low()),
+                        Percent(relative.high()));
+  }
+  text += fmt::format(", bias {:+.3g}", bias.value());
+  if (!all) {
+    text += fmt::format(" ({:+.3g} to {:+.3g})", bias.low(), bias.high());
+  }
+  text += all ? fmt::format(", at all {} covered pixels\n", error.covered_pixels())
+              : fmt::format(", from {} of {} covered pixels\n", error.sampled_pixels(),
+                            error.covered_pixels());
+  if (error.sample_worst_size() > 0) {
+    const v1::PixelError& worst = error.sample_worst(0);
+    text += fmt::format(
+        "error: worst of them at x {}, y {}, where R G B are off by {:+.3g} {:+.3g} {:+.3g}; the "
+        "image model's mean is {:.3g}\n",
+        worst.x(), worst.y(), worst.r(), worst.g(), worst.b(), error.reference_mean());
+  }
+  if (error.compared() == v1::COMPARED_FRAME_WITHOUT_SCATTERING) {
+    text += "error: of the frame without scattering, which the image model has not\n";
+  }
+  return text;
+}
+
 }  // namespace
 
 std::string ChoicesText(const std::vector<Choice>& choices) {
@@ -62,6 +99,9 @@ std::string FrameText(const FrameReport& report, const RenderedFrame& frame) {
                   report.frame ? fmt::format("frame {}: ", *report.frame) : "",
                   metadata.particle_count(), metadata.particle_count() == 1 ? "" : "s",
                   report.milliseconds, ServerMilliseconds(frame.header), metadata.gl_renderer());
+  if (frame.header.has_error()) {
+    text += ErrorText(frame.header.error());
+  }
   if (metadata.clamped_opacities() > 0) {
     text += fmt::format("{} opacities above 1 - 2^-20 were drawn as that\n",
                         metadata.clamped_opacities());
@@ -98,6 +138,9 @@ std::string FrameJson(const FrameReport& report, const RenderedFrame& frame,
   json.AddJson("metadata", JsonOf(frame.header.metadata()));
   json.AddJson("plan", JsonOf(frame.header.plan()));
   json.AddJson("timings", "[" + timings + "]");
+  if (frame.header.has_error()) {
+    json.AddJson("error", JsonOf(frame.header.error()));
+  }
   return json.Text();
 }
 

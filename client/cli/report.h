@@ -24,7 +24,7 @@ struct FrameReport {
 std::string ChoicesText(const std::vector<Choice>& choices);
 std::string FrameText(const FrameReport& report, const RenderedFrame& frame);
 // One line, its members: frame, input, milliseconds, server_milliseconds, outputs, choices,
-// request, metadata, plan, timings.
+// request, metadata, plan, timings; error where it was measured.
 std::string FrameJson(const FrameReport& report, const RenderedFrame& frame,
                       const v1::RenderFrameRequest& request, const std::vector<Choice>& choices);
 

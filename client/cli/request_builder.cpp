@@ -40,6 +40,7 @@ absl::StatusOr<v1::ImageFormat> FormatOf(const std::string& path, const RenderOp
   }
   if (extension == ".exr") {
     const bool needs_float = output.kind() == v1::OUTPUT_KIND_DEPTH ||
+                             output.kind() == v1::OUTPUT_KIND_ERROR ||
                              output.quantity() == v1::LIGHT_QUANTITY_OPTICAL_DEPTH;
     const auto by_content = needs_float ? v1::IMAGE_FORMAT_EXR_FLOAT : v1::IMAGE_FORMAT_EXR_HALF;
     return options.exr_format.value_or(IsExr(output.format()) ? output.format() : by_content);
@@ -268,6 +269,20 @@ void ApplyShadowAndSampling(const RenderOptions& options, v1::Scene& scene) {
   }
 }
 
+absl::Status ApplyMeasurement(const RenderOptions& options, v1::RenderFrameRequest& request) {
+  if (options.error_samples) {
+    request.mutable_measure_error()->set_samples(*options.error_samples);
+  }
+  if (options.error_seed) {
+    if (!request.has_measure_error()) {
+      return absl::InvalidArgumentError(
+          "--error-seed: is given; allowed: only with --measure-error");
+    }
+    request.mutable_measure_error()->set_seed(*options.error_seed);
+  }
+  return absl::OkStatus();
+}
+
 }  // namespace
 
 absl::Status ApplyFlags(const RenderOptions& options, v1::RenderFrameRequest& request) {
@@ -286,7 +301,7 @@ absl::Status ApplyFlags(const RenderOptions& options, v1::RenderFrameRequest& re
   if (!options.request_id.empty()) {
     request.set_request_id(options.request_id);
   }
-  return absl::OkStatus();
+  return ApplyMeasurement(options, request);
 }
 
 }  // namespace halflight::client

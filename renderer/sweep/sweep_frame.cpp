@@ -47,18 +47,12 @@ bool Shows(const FrameRequest& request, ImageKind kind) {
 
 }  // namespace
 
-absl::StatusOr<FramePlan> PlanSweepFrame(const FrameRequest& request,
-                                         const ParticleView& /*particles*/) {
+absl::Status PlanSweepFrame(const FrameRequest& request, const ParticleView& /*particles*/,
+                            FramePlan& plan) {
   if (absl::Status status = CheckRequest(request); !status.ok()) return status;
-  const Scene& scene = request.scene;
-  FramePlan plan;
-  plan.window_size = {scene.camera.window.width, scene.camera.window.height};
-  plan.composite_size =
-      (plan.window_size * scene.sampling.supersample + (scene.sampling.downsample - 1)) /
-      scene.sampling.downsample;
-  plan.keep_depth = Shows(request, ImageKind::kDepth);
-  for (size_t l = 0; l < scene.lights.size(); ++l) {
-    if (!scene.lights[l].casts_shadows()) continue;
+  const std::vector<Light>& lights = request.scene.lights;
+  for (size_t l = 0; l < lights.size(); ++l) {
+    if (!lights[l].casts_shadows()) continue;
     const std::string light = absl::StrCat("light ", l, " casts shadows");
     plan.passes.push_back({"sort along the light", light, 1});
     plan.passes.push_back({"sweep the light buffer through the particles", light, 1});
@@ -66,13 +60,7 @@ absl::StatusOr<FramePlan> PlanSweepFrame(const FrameRequest& request,
   }
   plan.passes.push_back({"sort by distance from the eye", "the image", 1});
   plan.passes.push_back({"composite tiles", "the image", 1});
-  if (scene.sampling.supersample > 1) {
-    plan.passes.push_back({"average samples", "supersample above 1", 1});
-  }
-  if (scene.sampling.downsample > 1) {
-    plan.passes.push_back({"enlarge samples", "downsample above 1", 1});
-  }
-  return plan;
+  return absl::OkStatus();
 }
 
 absl::StatusOr<DrawnImages> DrawSweepFrame(const FrameRequest& request,

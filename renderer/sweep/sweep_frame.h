@@ -13,10 +13,11 @@
 
 namespace halflight {
 
-// InvalidArgument, naming the field, where the request asks for what the sweep has not: scattering,
-// light layers, a shadow-casting light among the particles.
-absl::StatusOr<FramePlan> PlanSweepFrame(const FrameRequest& request,
-                                         const ParticleView& particles);
+// Adds the sweep's passes to a plan whose sizes are set. InvalidArgument, naming the field, where
+// the request asks for what the sweep has not: scattering, light layers, a shadow-casting light
+// among the particles.
+absl::Status PlanSweepFrame(const FrameRequest& request, const ParticleView& particles,
+                            FramePlan& plan);
 
 // What a request that PlanSweepFrame took shows; fills in the reports, one for each light.
 // Cancelled soon after `stop` was requested. Uses all cores.

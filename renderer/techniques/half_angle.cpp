@@ -18,12 +18,6 @@ glm::dvec3 ViewDirection(const Camera& camera) {
   return -glm::normalize(glm::dvec3(glm::row(camera.view_from_world, 2)));
 }
 
-bool Scatters(const Scene& scene) {
-  return scene.shadow.blur_mode == BlurMode::kTexelsPerSlice
-             ? scene.shadow.blur_texels > 0.0F
-             : scene.material.scattering_spread > 0.0F;
-}
-
 // World units by which light that crosses the whole cloud has spread sideways, thrice the standard
 // deviation; never so much that the cloud itself shrinks to nothing in the light buffer.
 double BorderForSpread(const TraversalContext& context) {
@@ -95,7 +89,7 @@ absl::StatusOr<Traversal> HalfAngle::PlanLight(const Scene& scene, const Particl
   traversal.interpolate = scene.shadow.interpolate;
   traversal.spacing = scene.shadow.spacing;
   traversal.light_buffer_size = scene.shadow.light_buffer_size;
-  traversal.blur = Scatters(scene);
+  traversal.blur = scene.scatters();
   traversal.colored_light_buffer = traversal.blur && source.colored_density();
   return traversal;
 }

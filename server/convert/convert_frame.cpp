@@ -67,7 +67,11 @@ absl::StatusOr<FrameJob> ConvertFrame(const v1::RenderFrameRequest& request,
   job.particle_sha256 = particles.sha256;
   job.request.scene = ConvertScene(request.scene(), particles.set, limits, checks);
   if (checks.ok()) {
-    OutputPlan plan = ConvertOutputs(request.outputs(), job.request.scene, limits, checks);
+    const Scene& scene = job.request.scene;
+    OutputPlan plan = ConvertOutputs(request.outputs(), scene, limits, checks);
+    if (checks.ok()) {
+      job.measure = ConvertMeasurement(request, scene, limits, plan, checks);
+    }
     job.request.images = std::move(plan.images);
     job.outputs = std::move(plan.outputs);
     job.pixel_bytes = plan.pixel_bytes;

@@ -2,12 +2,14 @@
 // only come out of here; nothing behind it checks values again.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "absl/status/statusor.h"
 #include "halflight/v1/service.pb.h"
 #include "renderer/frame.h"
+#include "server/convert/convert_measurement.h"
 #include "server/convert/convert_outputs.h"
 #include "server/limits.h"
 #include "server/particle_assembler.h"
@@ -21,6 +23,7 @@ struct FrameJob {
   std::string particle_sha256;
   FrameRequest request;
   std::vector<OutputJob> outputs;
+  std::optional<MeasureJob> measure;
   uint64_t pixel_bytes = 0;  // of all outputs together, in 32-bit float, at most
 };
 

@@ -77,7 +77,8 @@ OutputJob ConvertOutput(const v1::Output& output, const Scene& scene, const std:
 // An upper bound: the renderer may find that fewer slices or channels do.
 uint64_t PixelBytes(const ImageRequest& shown, const Scene& scene) {
   uint64_t channels = shown.kind == ImageKind::kBeauty ? 4 : 1;
-  if (ShowsLight(shown.kind) && scene.lights[shown.light_index].colored_density()) {
+  if (shown.kind == ImageKind::kError ||
+      (ShowsLight(shown.kind) && scene.lights[shown.light_index].colored_density())) {
     channels = 3;
   }
   uint64_t pixels = static_cast<uint64_t>(scene.camera.window.width) * scene.camera.window.height;
@@ -90,6 +91,8 @@ uint64_t PixelBytes(const ImageRequest& shown, const Scene& scene) {
   return pixels * channels * sizeof(float);
 }
 
+}  // namespace
+
 size_t IndexOfImage(std::vector<ImageRequest>& images, const ImageRequest& wanted) {
   const auto found = std::find_if(images.begin(), images.end(), [&](const ImageRequest& image) {
     return image.kind == wanted.kind && image.light_index == wanted.light_index &&
@@ -101,8 +104,6 @@ size_t IndexOfImage(std::vector<ImageRequest>& images, const ImageRequest& wante
   }
   return index;
 }
-
-}  // namespace
 
 bool IsSeenFromLight(ImageKind kind) {
   return kind == ImageKind::kLightBuffer || kind == ImageKind::kLightLayers;
@@ -118,7 +119,9 @@ OutputPlan ConvertOutputs(const google::protobuf::RepeatedPtrField<v1::Output>& 
     if (!checks.ok()) {
       break;
     }
-    job.image = IndexOfImage(plan.images, job.shown);
+    if (job.shown.kind != ImageKind::kError) {
+      job.image = IndexOfImage(plan.images, job.shown);
+    }
     plan.pixel_bytes += PixelBytes(job.shown, scene);
     plan.outputs.push_back(job);
   }

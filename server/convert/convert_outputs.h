@@ -19,7 +19,9 @@ namespace halflight {
 // One output of a frame, defaults filled in.
 struct OutputJob {
   ImageRequest shown;
-  size_t image = 0;  // which of FrameRequest::images; outputs that show the same share one
+  // Which of FrameRequest::images, or their number: the error, which is made of them. Outputs that
+  // show the same share one.
+  size_t image = 0;
   EncodeSettings encoding{ImageFormat::kPng8};
 };
 
@@ -29,9 +31,13 @@ struct OutputPlan {
   uint64_t pixel_bytes = 0;  // of all outputs together, in 32-bit float, at most
 };
 
-// The scene has passed its checks. Field paths start with "outputs".
+// The scene has passed its checks. Field paths start with "outputs". Outputs of the error have no
+// image yet: ConvertMeasurement gives it.
 OutputPlan ConvertOutputs(const google::protobuf::RepeatedPtrField<v1::Output>& outputs,
                           const Scene& scene, const ServerLimits& limits, FieldChecks& checks);
+
+// The place of an image among `images`, added where it is not there.
+size_t IndexOfImage(std::vector<ImageRequest>& images, const ImageRequest& wanted);
 
 // Whether the image shows a light's view of the particles, not the camera's.
 bool IsSeenFromLight(ImageKind kind);

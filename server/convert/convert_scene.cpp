@@ -167,22 +167,6 @@ void CheckPointLights(const Scene& scene, FieldChecks& checks) {
   }
 }
 
-// The reference takes time in proportion to what it samples, and to what each sample may meet; and
-// however few samples there are, memory in proportion to the particles.
-void CheckReferenceWork(const Scene& scene, const ServerLimits& limits, FieldChecks& checks) {
-  constexpr double kLeastSamples = 65536.0;
-  const double samples = std::max(
-      kLeastSamples, static_cast<double>(scene.camera.window.width) * scene.camera.window.height *
-                         scene.sampling.supersample * scene.sampling.supersample);
-  const auto particles = static_cast<double>(scene.particles->size());
-  if (samples * particles > static_cast<double>(limits.max_reference_work)) {
-    checks.Reject("scene.shadow.technique",
-                  fmt::format("SHADOW_TECHNIQUE_REFERENCE of {} samples times {} particles",
-                              samples, particles),
-                  fmt::format("a product of at most {}", limits.max_reference_work));
-  }
-}
-
 }  // namespace
 
 Scene ConvertScene(const v1::Scene& scene, std::shared_ptr<const ParticleSet> particles,
@@ -222,9 +206,25 @@ Scene ConvertScene(const v1::Scene& scene, std::shared_ptr<const ParticleSet> pa
     CheckPointLights(converted, checks);
   }
   if (checks.ok() && converted.shadow.technique == ShadowTechniqueKind::kReference) {
-    CheckReferenceWork(converted, limits, checks);
+    CheckReferenceWork(
+        "scene.shadow.technique", "SHADOW_TECHNIQUE_REFERENCE",
+        static_cast<double>(converted.camera.window.width) * converted.camera.window.height,
+        converted, limits, checks);
   }
   return converted;
+}
+
+void CheckReferenceWork(const std::string& field, const std::string& what, double pixels,
+                        const Scene& scene, const ServerLimits& limits, FieldChecks& checks) {
+  constexpr double kLeastSamples = 65536.0;
+  const double samples =
+      std::max(kLeastSamples, pixels * scene.sampling.supersample * scene.sampling.supersample);
+  const auto particles = static_cast<double>(scene.particles->size());
+  if (samples * particles > static_cast<double>(limits.max_reference_work)) {
+    checks.Reject(field,
+                  fmt::format("{} of {} samples times {} particles", what, samples, particles),
+                  fmt::format("a product of at most {}", limits.max_reference_work));
+  }
 }
 
 v1::Shadow DescribeShadow(const ShadowSettings& shadow) {

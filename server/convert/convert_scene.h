@@ -3,6 +3,7 @@
 #pragma once
 
 #include <memory>
+#include <string>
 
 #include "halflight/v1/scene.pb.h"
 #include "renderer/scene.h"
@@ -15,6 +16,12 @@ namespace halflight {
 // with "scene". `particles` are what the message's `particles` stand for.
 Scene ConvertScene(const v1::Scene& scene, std::shared_ptr<const ParticleSet> particles,
                    const ServerLimits& limits, FieldChecks& checks);
+
+// The reference takes time in proportion to what it samples, and to what each sample may meet; and
+// however few samples there are, memory in proportion to the particles. Rejects `field` where the
+// model of so many `pixels` of the scene goes beyond the limit on both; `what` asks for it.
+void CheckReferenceWork(const std::string& field, const std::string& what, double pixels,
+                        const Scene& scene, const ServerLimits& limits, FieldChecks& checks);
 
 // The other way: settings as used, for the frame's metadata.
 v1::Shadow DescribeShadow(const ShadowSettings& shadow);

@@ -51,6 +51,61 @@ v1::FrameMetadata DescribeMetadata(const FrameJob& job, const FrameResult& resul
   return metadata;
 }
 
+v1::ComparedFrame DescribeCompared(const MeasureJob& measure) {
+  return measure.without_scattering ? v1::COMPARED_FRAME_WITHOUT_SCATTERING
+                                    : v1::COMPARED_FRAME_RETURNED;
+}
+
+void Fill(v1::EstimatedFigure& message, const EstimatedFigure& figure) {
+  message.set_value(figure.value);
+  message.set_low(figure.low);
+  message.set_high(figure.high);
+}
+
+v1::MeasuredError DescribeError(const MeasureJob& measure, const ErrorEstimate& error) {
+  v1::MeasuredError described;
+  described.set_compared(DescribeCompared(measure));
+  described.set_covered_pixels(error.covered_pixels);
+  described.set_sampled_pixels(error.sampled_pixels);
+  if (measure.sample.has_value()) {
+    *described.mutable_measurement() = DescribeMeasurement(*measure.sample);
+  }
+  Fill(*described.mutable_mean_square_error(), error.mean_square_error);
+  Fill(*described.mutable_bias(), error.bias);
+  Fill(*described.mutable_rmse(), error.rmse);
+  Fill(*described.mutable_relative_rmse(), error.relative_rmse);
+  described.set_reference_mean(error.reference_mean);
+  described.set_sample_p999(error.sample_p999);
+  described.set_sample_max(error.sample_max);
+  for (const PixelError& worst : error.sample_worst) {
+    v1::PixelError& pixel = *described.add_sample_worst();
+    pixel.set_x(static_cast<uint32_t>(worst.pixel.x));
+    pixel.set_y(static_cast<uint32_t>(worst.pixel.y));
+    pixel.set_r(worst.error.r);
+    pixel.set_g(worst.error.g);
+    pixel.set_b(worst.error.b);
+  }
+  described.set_milliseconds(error.milliseconds);
+  return described;
+}
+
+// What a file says of the error; "low" and "high" are the interval of the relative RMSE.
+void AddErrorText(const MeasureJob& measure, const ErrorEstimate& error, ImageMetadata& metadata) {
+  const auto add = [&metadata](const char* name, const std::string& value) {
+    metadata.text.emplace_back(fmt::format("halflight:error.{}", name), value);
+  };
+  const auto number = [](double value) { return fmt::format("{:.6g}", value); };
+  add("relativeRmse", number(error.relative_rmse.value));
+  add("low", number(error.relative_rmse.low));
+  add("high", number(error.relative_rmse.high));
+  add("rmse", number(error.rmse.value));
+  add("mse", number(error.mean_square_error.value));
+  add("bias", number(error.bias.value));
+  add("samples", fmt::format("{}", error.sampled_pixels));
+  add("coveredPixels", fmt::format("{}", error.covered_pixels));
+  add("compared", v1::ComparedFrame_Name(DescribeCompared(measure)));
+}
+
 v1::OutputInfo DescribeEncoded(const OutputJob& output, const Image& image,
                                const EncodedImage& encoded) {
   v1::OutputInfo info;
@@ -72,7 +127,8 @@ v1::OutputInfo DescribeEncoded(const OutputJob& output, const Image& image,
 
 }  // namespace
 
-ImageMetadata DescribeImage(const FrameJob& job, const FrameResult& result, const OutputJob& output,
+ImageMetadata DescribeImage(const FrameJob& job, const FrameResult& result,
+                            const std::optional<ErrorEstimate>& error, const OutputJob& output,
                             const DeviceInfo& device, const std::string& server_version) {
   const Scene& scene = job.request.scene;
   const v1::Shadow shadow = DescribeShadow(scene.shadow);
@@ -101,6 +157,9 @@ ImageMetadata DescribeImage(const FrameJob& job, const FrameResult& result, cons
     }
     return metadata;
   }
+  if (job.measure.has_value() && error.has_value()) {
+    AddErrorText(*job.measure, *error, metadata);
+  }
   metadata.world_to_camera = scene.camera.view_from_world;
   metadata.world_to_ndc = NdcFromWorld(scene.camera);
   metadata.data_window = scene.camera.window;
@@ -109,6 +168,7 @@ ImageMetadata DescribeImage(const FrameJob& job, const FrameResult& result, cons
 }
 
 v1::FrameHeader DescribeFrame(const FrameJob& job, const FrameResult& result,
+                              const std::optional<ErrorEstimate>& error,
                               const std::vector<EncodedImage>& encoded,
                               const std::vector<StageTiming>& timings, const DeviceInfo& device,
                               const std::string& server_version) {
@@ -124,6 +184,9 @@ v1::FrameHeader DescribeFrame(const FrameJob& job, const FrameResult& result,
     v1::StageTiming& stage = *header.add_timings();
     stage.set_stage(timing.stage);
     stage.set_milliseconds(timing.milliseconds);
+  }
+  if (job.measure.has_value() && error.has_value()) {
+    *header.mutable_error() = DescribeError(*job.measure, *error);
   }
   for (size_t i = 0; i < encoded.size(); ++i) {
     const OutputJob& output = job.outputs[i];

@@ -48,6 +48,7 @@ inline constexpr std::array kOutputKinds = {
     EnumRow{v1::OUTPUT_KIND_LIGHT_TRANSMITTANCE, ImageKind::kLightTransmittance},
     EnumRow{v1::OUTPUT_KIND_LIGHT_BUFFER, ImageKind::kLightBuffer},
     EnumRow{v1::OUTPUT_KIND_LIGHT_LAYERS, ImageKind::kLightLayers},
+    EnumRow{v1::OUTPUT_KIND_ERROR, ImageKind::kError},
 };
 inline constexpr std::array kQuantities = {
     EnumRow{v1::LIGHT_QUANTITY_TRANSMITTANCE, LightQuantity::kTransmittance},

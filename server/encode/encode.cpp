@@ -48,6 +48,9 @@ absl::Status CheckChannels(const std::vector<std::string>& channels, ImageKind k
     case ImageKind::kLightLayers:
       allowed = {{"Y"}, {"R", "G", "B"}};
       break;
+    case ImageKind::kError:
+      allowed = {{"R", "G", "B"}};
+      break;
   }
   if (std::find(allowed.begin(), allowed.end(), channels) != allowed.end()) return absl::OkStatus();
   return absl::InvalidArgumentError(

@@ -52,8 +52,8 @@ struct EncodedImage {
 // finite values beyond half floats in kExrHalf, more than a million rows in PNG. Internal where
 // the image library fails. Any thread.
 //
-// PNG loses, knowingly: what is below 0 or above 1, and emission where alpha is 0, since colours
-// are stored unassociated.
+// PNG loses, knowingly: what is below 0 or above 1, the sign of errors, and emission where alpha is
+// 0, since colours are stored unassociated.
 absl::StatusOr<EncodedImage> EncodeImage(const Image& image, ImageKind kind, LightQuantity quantity,
                                          const EncodeSettings& settings,
                                          const ImageMetadata& metadata);

@@ -42,7 +42,9 @@ struct Range {
 
 std::optional<Range> FindRange(const EncodeInput& input) {
   const bool depth = input.kind == ImageKind::kDepth;
-  if (!depth && !(ShowsLight(input.kind) && input.quantity == LightQuantity::kOpticalDepth)) {
+  const bool error = input.kind == ImageKind::kError;
+  if (!depth && !error &&
+      !(ShowsLight(input.kind) && input.quantity == LightQuantity::kOpticalDepth)) {
     return std::nullopt;
   }
   float smallest = std::numeric_limits<float>::infinity();
@@ -53,6 +55,7 @@ std::optional<Range> FindRange(const EncodeInput& input) {
     largest = std::max(largest, value);
   }
   if (smallest > largest) return std::nullopt;  // no finite value: there is nothing to scale
+  if (error) return Range{std::max(std::abs(smallest), std::abs(largest)), 0.0};
   return depth ? Range{smallest, largest} : Range{std::max(largest, 0.0F), 0.0};
 }
 
@@ -84,11 +87,12 @@ std::vector<Integer> QuantizeLinear(const EncodeInput& input, const std::optiona
   }
   const double span = range->white - range->black;
   std::transform(pixels.begin(), pixels.end(), codes.begin(), [&](float value) -> Integer {
+    if (input.kind == ImageKind::kError) value = std::abs(value);
     if (!std::isfinite(value)) {
       const bool beyond_white = input.kind != ImageKind::kDepth && value > 0.0F;
       return beyond_white ? std::numeric_limits<Integer>::max() : Integer{0};
     }
-    // A single depth is all nearest: white. A single optical depth is 0: black.
+    // A single depth is all nearest: white. A single optical depth or error is 0: black.
     if (span == 0.0) return Quantize<Integer>(input.kind == ImageKind::kDepth ? 1.0F : 0.0F);
     return Quantize<Integer>(static_cast<float>((value - range->black) / span));
   });

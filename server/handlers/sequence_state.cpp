@@ -37,6 +37,9 @@ absl::StatusOr<FrameJob> SequenceState::Next(const v1::RenderFrameRequest& reque
   if (request.outputs_size() > 0) {
     *merged_.mutable_outputs() = request.outputs();
   }
+  if (request.has_measure_error()) {
+    *merged_.mutable_measure_error() = request.measure_error();
+  }
   merged_.set_request_id(request.request_id());
   return ConvertFrame(merged_, *particles_, backend.limits);
 }

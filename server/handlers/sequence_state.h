@@ -13,9 +13,9 @@ namespace halflight {
 
 class SequenceState {
  public:
-  // The job of the stream's next request, where each field of the scene that is unset, and empty
-  // outputs, are those of the request before. Errors as for a single frame. The particles of the
-  // last request are kept alive here, even when the store drops them.
+  // The job of the stream's next request, where each field of the scene that is unset, an unset
+  // measure_error and empty outputs are those of the request before. Errors as for a single frame.
+  // The particles of the last request are kept alive here, even when the store drops them.
   absl::StatusOr<FrameJob> Next(const v1::RenderFrameRequest& request, const Backend& backend);
 
  private:

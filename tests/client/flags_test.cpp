@@ -164,6 +164,28 @@ TEST(RenderFlags, ChooseFormatsByExtensionAndStorageFlags) {
                    {"kind": 1, "format": "IMAGE_FORMAT_EXR_FLOAT"}]})");
 }
 
+TEST(RenderFlags, MeasureTheErrorWithAValueBehindTheSignOfEqualityAlone) {
+  RenderOptions options;
+  EXPECT_EQ(Parse({"--measure-error", "in.ply"}, options), "");
+  EXPECT_EQ(options.input, "in.ply");
+  ExpectJson(RequestOf({"in.ply", "--measure-error"}),
+             R"({"scene": {"camera": {}}, "measure_error": {}})");
+  ExpectJson(RequestOf({"--measure-error=4096", "--error-seed", "18446744073709551615", "in.ply"}),
+             R"({"scene": {"camera": {}},
+                 "measure_error": {"samples": 4096, "seed": "18446744073709551615"}})");
+  const auto scene = ParseRequestJson(R"({"measure_error": {"samples": 64, "seed": 1}})");
+  ASSERT_TRUE(scene.ok());
+  ExpectJson(RequestOf({"--error-seed", "2"}, *scene),
+             R"({"scene": {"camera": {}}, "measure_error": {"samples": 64, "seed": "2"}})");
+}
+
+TEST(RenderFlags, StoreTheErrorInFloats) {
+  ExpectJson(RequestOf({"-o", "error=e.exr", "-o", "error=e.png"}),
+             R"({"scene": {"camera": {}}, "outputs": [
+                   {"kind": "OUTPUT_KIND_ERROR", "format": "IMAGE_FORMAT_EXR_FLOAT"},
+                   {"kind": "OUTPUT_KIND_ERROR", "format": "IMAGE_FORMAT_PNG8"}]})");
+}
+
 TEST(RenderFlags, OverrideTheSceneFileFieldByField) {
   const auto scene = ParseRequestJson(
       R"({"scene": {"camera": {"look_at": {"eye": {"z": 5}, "target": {}}, "width": 100},
@@ -241,6 +263,10 @@ TEST(RenderFlags, NameTheFlagTheValueAndWhatIsAllowed) {
                 {"--density", "2 times for 1 lights"}},
            Case{{"--light", "none", "--light-color", "1"}, {"--light-color", "0 lights"}},
            Case{{"--light", "camera", "--falloff"}, {"--falloff", "point"}},
+           Case{{"--measure-error=31"}, {"--measure-error", "'31'", "from 32 to 1048576"}},
+           Case{{"--measure-error=few"}, {"--measure-error", "'few'"}},
+           Case{{"--measure-error", "--error-seed", "-1"}, {"--error-seed", "'-1'"}},
+           Case{{"--error-seed", "1"}, {"--error-seed", "--measure-error"}},
            Case{{"--no-such-flag"}, {"--no-such-flag"}},
        }) {
     const std::string error = ErrorOf(bad.words);

@@ -66,6 +66,14 @@ TEST(Exr, FloatKeepsEveryValueAndTheNamesOfChannels) {
   EXPECT_EQ(parts[0].sample_type, "float");
 }
 
+TEST(Exr, ErrorsKeepTheirSign) {
+  const Image image = MakeImage(2, 1, {"R", "G", "B"}, {-0.5F, 1e-9F, 2.0F, 0.0F, -3e-8F, 0.1F});
+  const auto parts = DecodeExr(Encode(image, ImageKind::kError, ImageFormat::kExrFloat));
+  ASSERT_EQ(parts.size(), 1U);
+  EXPECT_EQ(parts[0].values, image.pixels);
+  EXPECT_THAT(parts[0].channels, testing::ElementsAre("R", "G", "B"));
+}
+
 TEST(Exr, HalfRoundsToNearest) {
   const Image image = MakeBeauty(31, 17);
   const auto parts = DecodeExr(Encode(image, ImageKind::kBeauty, ImageFormat::kExrHalf));

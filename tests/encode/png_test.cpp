@@ -125,6 +125,24 @@ TEST(Png, EmptyOpticalDepthIsBlack) {
   EXPECT_THAT(DecodePng(encoded).values, testing::ElementsAre(0, 0));
 }
 
+TEST(Png, ErrorsAreWhiteWhereTheyAreLargestWhateverTheirSign) {
+  const auto encoded = Encode(MakeImage(2, 1, {"R", "G", "B"}, {0.0F, -0.5F, 0.25F, 0.125F, 0, 0}),
+                              ImageKind::kError, ImageFormat::kPng8);
+  const DecodedPart png = DecodePng(encoded);
+  EXPECT_THAT(png.codes, testing::ElementsAre(0, 65535, 128 * 257, 64 * 257, 0, 0));
+  EXPECT_EQ(encoded->white_black, std::make_pair(0.5, 0.0));
+  EXPECT_EQ(png.texts.at("halflight:white_value"), "0.5");
+}
+
+TEST(Png, NoErrorIsBlackAndAnInfiniteOneWhite) {
+  const auto none = Encode(MakeImage(1, 1, {"R", "G", "B"}, {0.0F, 0.0F, 0.0F}), ImageKind::kError,
+                           ImageFormat::kPng8);
+  EXPECT_THAT(DecodePng(none).codes, testing::ElementsAre(0, 0, 0));
+  const auto infinite = Encode(MakeImage(1, 1, {"R", "G", "B"}, {-kInfinity, 0.5F, 1.0F}),
+                               ImageKind::kError, ImageFormat::kPng8);
+  EXPECT_THAT(DecodePng(infinite).codes, testing::ElementsAre(65535, 128 * 257, 65535));
+}
+
 TEST(Png, TransmittanceIsNotScaled) {
   const auto encoded =
       Encode(MakeImage(1, 1, {"Y"}, {0.4F}), ImageKind::kLightBuffer, ImageFormat::kPng8);

@@ -82,6 +82,24 @@ TEST(Cli, WritesSeveralOutputsOfOneFrame) {
   EXPECT_GT(LargestValue(folder / "c.png", "png"), 0.5F);
 }
 
+TEST(Cli, StatesTheErrorAndShowsWhereItIs) {
+  const Folder folder;
+  const Ended ended =
+      RunHalflight(folder, Small({"render", "--measure-error=128", PlumePath("0024"),
+                                  "--scattering", "0.1", "-o", folder / "f.exr"}));
+  ASSERT_EQ(ended.code, 0) << ended.err;
+  EXPECT_THAT(ended.out, HasSubstr("error: relative RMSE "));
+  EXPECT_THAT(ended.out, HasSubstr("from 128 of "));
+  EXPECT_THAT(ended.out, HasSubstr("without scattering"));
+  EXPECT_EQ(Decode(Contents(folder / "f.exr"), "exr").at(0).texts.at("halflight:error.samples"),
+            "128");
+  const Ended shown =
+      RunHalflight(folder, Small({"render", PlumePath("0024"), "-o", "error=" + folder / "e.png"}));
+  ASSERT_EQ(shown.code, 0) << shown.err;
+  EXPECT_THAT(shown.out, HasSubstr("error, 80 x 60, white is "));
+  EXPECT_EQ(LargestValue(folder / "e.png", "png"), 1.0F);
+}
+
 TEST(Cli, PrintedSceneGivesTheSameBytesAgain) {
   const Folder folder;
   const std::vector<std::string> flags =

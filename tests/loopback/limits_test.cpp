@@ -132,7 +132,7 @@ TEST(Limits, AreThoseThatTheServerTells) {
   ASSERT_TRUE(info.ok()) << info.status();
   EXPECT_EQ(info->limits().max_image_size(), 64U);
   EXPECT_EQ(info->gl_renderer(), Engine().device().gl_renderer);
-  EXPECT_EQ(info->output_kinds_size(), 6);
+  EXPECT_EQ(info->output_kinds_size(), 7);
   EXPECT_EQ(info->formats_size(), 5);
   Scene scene = test::BallScene(50, 64);
   scene.shadow.slices = 10;

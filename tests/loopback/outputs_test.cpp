@@ -20,7 +20,8 @@ constexpr int kSlices = 3;
 
 constexpr std::array kKinds = {v1::OUTPUT_KIND_BEAUTY,       v1::OUTPUT_KIND_COVERAGE,
                                v1::OUTPUT_KIND_DEPTH,        v1::OUTPUT_KIND_LIGHT_TRANSMITTANCE,
-                               v1::OUTPUT_KIND_LIGHT_BUFFER, v1::OUTPUT_KIND_LIGHT_LAYERS};
+                               v1::OUTPUT_KIND_LIGHT_BUFFER, v1::OUTPUT_KIND_LIGHT_LAYERS,
+                               v1::OUTPUT_KIND_ERROR};
 constexpr std::array kFormats = {v1::IMAGE_FORMAT_PNG8, v1::IMAGE_FORMAT_PNG16,
                                  v1::IMAGE_FORMAT_EXR_HALF, v1::IMAGE_FORMAT_EXR_FLOAT,
                                  v1::IMAGE_FORMAT_RAW_FLOAT};
@@ -68,7 +69,8 @@ TEST(Outputs, EveryKindInEveryFormatDecodesToItsSize) {
     const int layers = kind == v1::OUTPUT_KIND_LIGHT_LAYERS ? kSlices : 1;
     const int width = of_light ? kTexels : kWidth;
     const int height = of_light ? kTexels : kHeight;
-    const int channels = kind == v1::OUTPUT_KIND_BEAUTY ? 4 : 1;
+    const bool colored = kind == v1::OUTPUT_KIND_BEAUTY || kind == v1::OUTPUT_KIND_ERROR;
+    const int channels = kind == v1::OUTPUT_KIND_BEAUTY ? 4 : (colored ? 3 : 1);
     EXPECT_EQ(info.width(), static_cast<uint32_t>(width));
     EXPECT_EQ(info.height(), static_cast<uint32_t>(height));
     EXPECT_EQ(info.layers(), static_cast<uint32_t>(layers));
@@ -91,7 +93,7 @@ TEST(Outputs, EveryKindInEveryFormatDecodesToItsSize) {
     ASSERT_EQ(values.size(), raw.size());
     if (format == v1::IMAGE_FORMAT_EXR_FLOAT) {
       EXPECT_EQ(values, raw);
-    } else if (kind != v1::OUTPUT_KIND_BEAUTY && kind != v1::OUTPUT_KIND_DEPTH) {
+    } else if (!colored && kind != v1::OUTPUT_KIND_DEPTH) {
       EXPECT_LT(MaxDifference(values, raw),
                 format == v1::IMAGE_FORMAT_PNG8 ? 0.51 / 255 : 0.51 / 1024);
     }

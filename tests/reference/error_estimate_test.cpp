@@ -13,6 +13,7 @@
 #include <glm/geometric.hpp>
 #include <glm/gtc/matrix_transform.hpp>
 
+#include "renderer/error_map.h"
 #include "renderer/reference/evaluator.h"
 #include "tests/oracle/oracle.h"
 #include "tests/oracle/plume.h"
@@ -20,6 +21,8 @@
 
 namespace halflight {
 namespace {
+
+using reference::BeautyOf;
 
 struct FrameCase {
   const char* name;
@@ -48,14 +51,6 @@ Scene SceneOf(const FrameCase& frame) {
   light.kind = DirectionalLight{glm::normalize(frame.light)};
   scene.lights = {light};
   return scene;
-}
-
-Image BeautyOf(const std::vector<glm::dvec4>& rgba, int width) {
-  Image image{width, static_cast<int>(rgba.size()) / width, 1, {"R", "G", "B", "A"}, {}};
-  for (const glm::dvec4& pixel : rgba) {
-    for (int c = 0; c < 4; ++c) image.pixels.push_back(static_cast<float>(pixel[c]));
-  }
-  return image;
 }
 
 // A frame and the whole truth about it.
@@ -252,6 +247,26 @@ TEST(ErrorEstimate, OfAnEmptyFrameIsNothing) {
       KnownFrame(BeautyOf(std::vector<glm::dvec4>(9), 3), std::vector<glm::dvec4>(9)).Estimate({});
   EXPECT_EQ(estimate.covered_pixels, 0U);
   EXPECT_EQ(estimate.rmse.value, 0.0);
+}
+
+TEST(ErrorEstimate, OfABlackModelIsInfiniteAndOfAFrameThatIsNotFiniteToo) {
+  const std::vector<glm::dvec4> black(400, glm::dvec4(0.0, 0.0, 0.0, 1.0));
+  const ErrorEstimate none = KnownFrame(BeautyOf(black, 20), black).Estimate({});
+  EXPECT_EQ(none.relative_rmse.high, 0.0);
+  const std::vector<glm::dvec4> grey(400, glm::dvec4(0.5, 0.5, 0.5, 1.0));
+  const ErrorEstimate wrong = KnownFrame(BeautyOf(grey, 20), black).Estimate({});
+  EXPECT_EQ(wrong.rmse.value, 0.5);
+  EXPECT_EQ(wrong.relative_rmse.value, HUGE_VAL);
+
+  KnownFrame broken = MadeUpFrame(64, 64);
+  broken.beauty.pixels[4 * 100] = NAN;
+  broken.beauty.pixels[4 * 200] = INFINITY;
+  const Image map{64, 64, 1, {"R", "G", "B"}, std::vector<float>(3 * 64 * 64, NAN)};
+  for (const ErrorEstimate& estimate :
+       {broken.Estimate({.samples = 8192}), ErrorOf(broken.beauty, map)}) {
+    EXPECT_FALSE(estimate.relative_rmse.high <= 1.0) << "it must not pass for a good frame";
+    EXPECT_EQ(estimate.sample_max, HUGE_VAL);
+  }
 }
 
 TEST(ErrorEstimate, RefusesTooFewSamplesAndIsCancelled) {

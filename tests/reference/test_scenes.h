@@ -12,6 +12,7 @@
 #include <glm/geometric.hpp>
 #include <glm/gtc/matrix_transform.hpp>
 
+#include "renderer/image.h"
 #include "renderer/scene.h"
 
 namespace halflight::reference {
@@ -65,6 +66,15 @@ inline glm::dvec3 RayOf(const Scene& scene, const glm::ivec2& pixel) {
   const double slope = std::tan(std::get<Perspective>(scene.camera.projection).vertical_fov / 2.0);
   return glm::normalize(glm::dvec3((2.0 * (pixel.x + 0.5) / size - 1.0) * slope,
                                    (1.0 - 2.0 * (pixel.y + 0.5) / size) * slope, -1.0));
+}
+
+// The frame that shows these pixels.
+inline Image BeautyOf(const std::vector<glm::dvec4>& rgba, int width) {
+  Image image{width, static_cast<int>(rgba.size()) / width, 1, {"R", "G", "B", "A"}, {}};
+  for (const glm::dvec4& pixel : rgba) {
+    for (int c = 0; c < 4; ++c) image.pixels.push_back(static_cast<float>(pixel[c]));
+  }
+  return image;
 }
 
 inline void ExpectNear(const glm::dvec4& value, const glm::dvec4& expected,

@@ -20,13 +20,7 @@ namespace {
 using testing::FakeImage;
 using testing::MakeParticles;
 using testing::MakeRequest;
-
-FrameJob MustConvert(const v1::RenderFrameRequest& request, const ServerLimits& limits = {}) {
-  ParticleStore store(1 << 20);
-  auto job = ConvertRequest(request, store, limits);
-  EXPECT_TRUE(job.ok()) << job.status();
-  return job.ok() ? *std::move(job) : FrameJob{};
-}
+using testing::MustConvert;
 
 // Where a world point lands in the image, (0, 0) top left to (1, 1) bottom right.
 glm::dvec3 Project(const glm::dmat4& matrix, const glm::dvec3& point) {
@@ -207,9 +201,9 @@ TEST(DescribeFrame, TellsSettingsAsUsedAndTheMatricesOfTheWholeImage) {
   result.lights.resize(1);
   result.clamped_opacities = 3;
   const DeviceInfo device{.gl_renderer = "fake", .gl_version = "4.5"};
-  const v1::FrameHeader header =
-      DescribeFrame(job, result, {{.bytes = "abc", .media_type = "image/png", .white_black = {}}},
-                    {{"encode", 2.5}}, device, "1.2.3");
+  const v1::FrameHeader header = DescribeFrame(
+      job, result, {}, {{.bytes = "abc", .media_type = "image/png", .white_black = {}}},
+      {{"encode", 2.5}}, device, "1.2.3");
 
   EXPECT_EQ(header.metadata().request_id(), "shot 7");
   EXPECT_EQ(header.metadata().shadow().slices(), 128U);
@@ -223,7 +217,7 @@ TEST(DescribeFrame, TellsSettingsAsUsedAndTheMatricesOfTheWholeImage) {
   EXPECT_EQ(header.outputs(0).byte_size(), 3U);
   EXPECT_FALSE(header.outputs(0).has_white_value());
 
-  const ImageMetadata metadata = DescribeImage(job, result, job.outputs[0], device, "1.2.3");
+  const ImageMetadata metadata = DescribeImage(job, result, {}, job.outputs[0], device, "1.2.3");
   EXPECT_EQ(metadata.data_window.width, 8);
   EXPECT_EQ(metadata.display_size, glm::ivec2(64, 48));
   EXPECT_EQ(*metadata.world_to_ndc, NdcFromWorld(job.request.scene.camera));
@@ -237,7 +231,7 @@ TEST(DescribeImage, LightBuffersCarryTheMatricesOfTheirLight) {
   result.lights.resize(1);
   result.lights[0].light_texture_from_world[3][0] = 5.0;
   result.lights[0].light_view_from_world[3][0] = 6.0;
-  const ImageMetadata metadata = DescribeImage(job, result, job.outputs[0], DeviceInfo{}, "1");
+  const ImageMetadata metadata = DescribeImage(job, result, {}, job.outputs[0], DeviceInfo{}, "1");
   EXPECT_EQ(*metadata.world_to_ndc, result.lights[0].light_texture_from_world);
   EXPECT_EQ(*metadata.world_to_camera, result.lights[0].light_view_from_world);
   EXPECT_EQ(metadata.display_size, glm::ivec2(0));

@@ -152,6 +152,11 @@ v1::RenderFrameRequest MakeRequest() {
   return request;
 }
 
+FrameJob MustConvert(const v1::RenderFrameRequest& request, const ServerLimits& limits) {
+  ParticleStore store(1 << 20);
+  return *ConvertRequest(request, store, limits);
+}
+
 absl::StatusOr<EncodedImage> EncodePlain(const Image& image, ImageKind /*kind*/,
                                          LightQuantity /*quantity*/,
                                          const EncodeSettings& /*settings*/,

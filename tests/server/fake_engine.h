@@ -12,6 +12,7 @@
 
 #include "halflight/v1/service.pb.h"
 #include "renderer/frame_engine.h"
+#include "server/convert/convert_frame.h"
 #include "server/encode/encode.h"
 
 namespace halflight::testing {
@@ -71,6 +72,10 @@ v1::InlineParticles MakeParticles(int count, const std::vector<v1::ParticleAttri
 
 // Two particles with a radius, a camera, one directional light with shadows, one beauty output.
 v1::RenderFrameRequest MakeRequest();
+
+// The request's job; ends the program, saying why, where the request is refused.
+FrameJob MustConvert(const v1::RenderFrameRequest& request = MakeRequest(),
+                     const ServerLimits& limits = {});
 
 // Stands in for EncodeImage: the image's floats as they lie in memory.
 absl::StatusOr<EncodedImage> EncodePlain(const Image& image, ImageKind kind, LightQuantity quantity,

@@ -13,50 +13,28 @@
 #include "server/frame_log.h"
 #include "server/retry_hint.h"
 #include "tests/process/wait_for.h"
-#include "tests/server/fake_engine.h"
+#include "tests/server/pipeline_fixture.h"
 
 namespace halflight {
 namespace {
 
 using testing::EncodePlain;
-using testing::FakeEngine;
 using testing::FakeImage;
 using ::testing::HasSubstr;
 using testing::MakeRequest;
+using testing::MustConvert;
 using testing::WaitFor;
 
-using Result = absl::StatusOr<std::shared_ptr<const EncodedFrame>>;
+using testing::Result;
 
-FrameJob MakeJob(const v1::RenderFrameRequest& request = MakeRequest()) {
-  ParticleStore store(1 << 20);
-  return *ConvertRequest(request, store, ServerLimits{});
-}
-
-class Pipeline : public ::testing::Test {
- protected:
-  void Start(PipelineOptions options) { pipeline_.emplace(engine_, std::move(options)); }
-
-  std::future<Result> Submit(FrameJob job, std::stop_token stop = {}) {
-    auto promise = std::make_shared<std::promise<Result>>();
-    const absl::Status status =
-        pipeline_->Submit(std::move(job), std::move(stop),
-                          [promise](Result result) { promise->set_value(std::move(result)); });
-    if (!status.ok()) {
-      promise->set_value(status);
-    }
-    return promise->get_future();
-  }
-
-  FakeEngine engine_;
-  std::optional<FramePipeline> pipeline_;
-};
+class Pipeline : public testing::PipelineTest {};
 
 TEST_F(Pipeline, FrameHoldsEveryOutputWithItsDigestInOrder) {
   Start({.encode_threads = 3, .server_version = "1.2.3", .encode = EncodePlain});
   v1::RenderFrameRequest request = MakeRequest();
   request.add_outputs()->set_kind(v1::OUTPUT_KIND_DEPTH);
   request.add_outputs()->set_kind(v1::OUTPUT_KIND_COVERAGE);
-  const FrameJob job = MakeJob(request);
+  const FrameJob job = MustConvert(request);
   const Result result = Submit(job).get();
   ASSERT_TRUE(result.ok()) << result.status();
   const EncodedFrame& frame = **result;
@@ -76,8 +54,8 @@ TEST_F(Pipeline, FrameHoldsEveryOutputWithItsDigestInOrder) {
 
 TEST_F(Pipeline, MakesRequestIdsThatDiffer) {
   Start({.encode = EncodePlain});
-  const Result first = Submit(MakeJob()).get();
-  const Result second = Submit(MakeJob()).get();
+  const Result first = Submit(MustConvert()).get();
+  const Result second = Submit(MustConvert()).get();
   EXPECT_FALSE((*first)->header.metadata().request_id().empty());
   EXPECT_NE((*first)->header.metadata().request_id(), (*second)->header.metadata().request_id());
 }
@@ -85,7 +63,7 @@ TEST_F(Pipeline, MakesRequestIdsThatDiffer) {
 TEST_F(Pipeline, EngineErrorsArriveAsTheyAre) {
   Start({.encode = EncodePlain});
   engine_.FailWith(absl::InvalidArgumentError("scene.lighting: nonsense"));
-  const Result result = Submit(MakeJob()).get();
+  const Result result = Submit(MustConvert()).get();
   EXPECT_EQ(result.status().code(), absl::StatusCode::kInvalidArgument);
   EXPECT_EQ(result.status().message(), "scene.lighting: nonsense");
 }
@@ -101,7 +79,7 @@ TEST_F(Pipeline, EncodingErrorsNameTheOutput) {
   }});
   v1::RenderFrameRequest request = MakeRequest();
   request.add_outputs()->set_kind(v1::OUTPUT_KIND_DEPTH);
-  const Result result = Submit(MakeJob(request)).get();
+  const Result result = Submit(MustConvert(request)).get();
   EXPECT_EQ(result.status().code(), absl::StatusCode::kInvalidArgument);
   EXPECT_EQ(result.status().message(), "outputs[1]: too large for PNG");
 }
@@ -109,15 +87,15 @@ TEST_F(Pipeline, EncodingErrorsNameTheOutput) {
 TEST_F(Pipeline, RefusesWithAHintWhenFullAndTakesAgainAfterwards) {
   Start({.max_queued_frames = 2, .encode = EncodePlain});
   engine_.SetGate(false);
-  auto first = Submit(MakeJob());
-  auto second = Submit(MakeJob());
-  const Result third = Submit(MakeJob()).get();
+  auto first = Submit(MustConvert());
+  auto second = Submit(MustConvert());
+  const Result third = Submit(MustConvert()).get();
   EXPECT_EQ(third.status().code(), absl::StatusCode::kResourceExhausted);
   EXPECT_TRUE(RetryHint(third.status()).has_value());
   engine_.SetGate(true);
   EXPECT_TRUE(first.get().ok());
   EXPECT_TRUE(second.get().ok());
-  EXPECT_TRUE(Submit(MakeJob()).get().ok());
+  EXPECT_TRUE(Submit(MustConvert()).get().ok());
 }
 
 TEST_F(Pipeline, FramesThatWaitForTheEncoderCountAsQueued) {
@@ -129,9 +107,9 @@ TEST_F(Pipeline, FramesThatWaitForTheEncoderCountAsQueued) {
            held.wait();
            return EncodePlain(image, kind, quantity, settings, metadata);
          }});
-  auto first = Submit(MakeJob());
+  auto first = Submit(MustConvert());
   ASSERT_TRUE(WaitFor([&] { return engine_.rendered() == 1; }));
-  EXPECT_EQ(Submit(MakeJob()).get().status().code(), absl::StatusCode::kResourceExhausted);
+  EXPECT_EQ(Submit(MustConvert()).get().status().code(), absl::StatusCode::kResourceExhausted);
   release.set_value();
   EXPECT_TRUE(first.get().ok());
 }
@@ -145,9 +123,9 @@ TEST_F(Pipeline, EncodingDoesNotHoldUpRendering) {
            held.wait();
            return EncodePlain(image, kind, quantity, settings, metadata);
          }});
-  auto first = Submit(MakeJob());
-  auto second = Submit(MakeJob());
-  auto third = Submit(MakeJob());
+  auto first = Submit(MustConvert());
+  auto second = Submit(MustConvert());
+  auto third = Submit(MustConvert());
   EXPECT_TRUE(WaitFor([&] { return engine_.rendered() == 3; }));
   release.set_value();
   EXPECT_TRUE(first.get().ok());
@@ -159,7 +137,7 @@ TEST_F(Pipeline, CancelledFrameIsDroppedBeforeItIsRendered) {
   Start({.encode = EncodePlain});
   engine_.SetGate(false);
   std::stop_source stop;
-  auto frame = Submit(MakeJob(), stop.get_token());
+  auto frame = Submit(MustConvert(), stop.get_token());
   stop.request_stop();
   EXPECT_EQ(frame.get().status().code(), absl::StatusCode::kCancelled);
   EXPECT_EQ(engine_.rendered(), 0);
@@ -178,7 +156,7 @@ TEST_F(Pipeline, CancelledFrameIsNotEncoded) {
   v1::RenderFrameRequest request = MakeRequest();
   request.add_outputs()->set_kind(v1::OUTPUT_KIND_DEPTH);
   request.add_outputs()->set_kind(v1::OUTPUT_KIND_COVERAGE);
-  const Result result = Submit(MakeJob(request), stop.get_token()).get();
+  const Result result = Submit(MustConvert(request), stop.get_token()).get();
   EXPECT_EQ(result.status().code(), absl::StatusCode::kCancelled);
   EXPECT_EQ(encoded, 1) << "the outputs after the cancellation were encoded";
 }
@@ -186,17 +164,17 @@ TEST_F(Pipeline, CancelledFrameIsNotEncoded) {
 TEST_F(Pipeline, RefusalOfTheEngineLeavesRoomForTheNext) {
   Start({.max_queued_frames = 1, .encode = EncodePlain});
   engine_.RefuseWith(absl::ResourceExhaustedError("full"));
-  const Result refused = Submit(MakeJob()).get();
+  const Result refused = Submit(MustConvert()).get();
   EXPECT_EQ(refused.status().code(), absl::StatusCode::kResourceExhausted);
   EXPECT_TRUE(RetryHint(refused.status()).has_value());
   engine_.RefuseWith(absl::OkStatus());
-  EXPECT_TRUE(Submit(MakeJob()).get().ok());
+  EXPECT_TRUE(Submit(MustConvert()).get().ok());
 }
 
 TEST_F(Pipeline, EndWaitsForWhatWasAccepted) {
   Start({.encode = EncodePlain});
   engine_.SetGate(false);
-  auto frame = Submit(MakeJob());
+  auto frame = Submit(MustConvert());
   std::jthread opener([this] {
     std::this_thread::sleep_for(std::chrono::milliseconds(30));
     engine_.SetGate(true);
@@ -206,10 +184,10 @@ TEST_F(Pipeline, EndWaitsForWhatWasAccepted) {
 }
 
 TEST(FrameLog, IsOneLineOfKeysWhateverTheClientSends) {
-  FrameJob job = MakeJob();
+  FrameJob job = MustConvert();
   job.request_id = "a \"b\" \\";
-  const std::string line =
-      FrameLogLine(job, {{"light sweep", 1.5}, {"total", 2.0}}, absl::InternalError("two\nlines"));
+  const std::string line = FrameLogLine(job, {{"light sweep", 1.5}, {"total", 2.0}}, {},
+                                        absl::InternalError("two\nlines"));
   EXPECT_THAT(line, HasSubstr(R"(request_id="a \"b\" \\")"));
   EXPECT_THAT(line, HasSubstr("technique=SHADOW_TECHNIQUE_HALF_ANGLE particles=2 size=64x48"));
   EXPECT_THAT(line, HasSubstr("light_sweep_ms=1.50 total_ms=2.00 outcome=INTERNAL"));

@@ -317,6 +317,23 @@ TEST_F(Sequence, UnsetPartsAreThoseOfTheRequestBefore) {
   EXPECT_EQ(last.images[0].kind, ImageKind::kCoverage);
 }
 
+TEST_F(Sequence, MeasurementIsKeptUntilAnotherTakesItsPlace) {
+  v1::RenderFrameRequest second;
+  second.mutable_measure_error()->set_samples(64);
+  v1::RenderFrameRequest fourth;
+  fourth.mutable_measure_error()->set_seed(3);
+  Play({Wrap(MakeRequest()), Wrap(second), Same(), Wrap(fourth)});
+  ASSERT_TRUE(sink_.finished()->ok()) << *sink_.finished();
+  std::vector<std::string> measurements;
+  for (const v1::RenderSequenceResponse& message : sink_.written()) {
+    if (message.has_header()) {
+      measurements.push_back(message.header().error().measurement().ShortDebugString());
+    }
+  }
+  EXPECT_THAT(measurements,
+              ::testing::ElementsAre("", "samples: 64", "samples: 64", "samples: 1024 seed: 3"));
+}
+
 TEST_F(Sequence, ParticlesOfTheStreamSurviveTheirEviction) {
   ParticleStore small(2 * 16);
   Backend backend{engine_.device(), limits_, version_, small, upload_memory_, pipeline_};

@@ -349,6 +349,28 @@ INSTANTIATE_TEST_SUITE_P(
                   ShadowOf(r).set_light_buffer_size(2048);
                 },
                 "outputs: 100663296 bytes"},
+        Refusal{"ErrorOfTooMuch",
+                [](Request& r) {
+                  r.add_outputs()->set_kind(v1::OUTPUT_KIND_DEPTH);
+                  r.add_outputs()->set_kind(v1::OUTPUT_KIND_ERROR);
+                },
+                "outputs[2].kind: OUTPUT_KIND_ERROR of 65536 samples times 2 particles"},
+        Refusal{"LightOfTheError",
+                [](Request& r) {
+                  OutputOf(r).set_kind(v1::OUTPUT_KIND_ERROR);
+                  OutputOf(r).set_light_index(1);
+                },
+                "outputs[0].light_index: 1, allowed: unset"},
+        Refusal{"MeasuredPixelsTooFew",
+                [](Request& r) { r.mutable_measure_error()->set_samples(31); },
+                "measure_error.samples: 31, allowed: [32, 1048576]"},
+        Refusal{"MeasuredPixelsTooMany",
+                [](Request& r) { r.mutable_measure_error()->set_samples(1048577); },
+                "measure_error.samples: 1048577, allowed: [32, 1048576]"},
+        Refusal{
+            "MeasurementOfTooMuch", [](Request& r) { r.mutable_measure_error(); },
+            "measure_error: a measurement of 65536 samples times 2 particles, allowed: a product "
+            "of at most 1000"},
         Refusal{"RequestIdTooLong", [](Request& r) { r.set_request_id(std::string(129, 'a')); },
                 "request_id: 129 bytes"},
         Refusal{"RequestIdUnprintable", [](Request& r) { r.set_request_id("a\nb"); },

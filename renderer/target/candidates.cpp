@@ -1,0 +1,233 @@
+#include "renderer/target/candidates.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "absl/strings/str_cat.h"
+
+namespace halflight {
+
+namespace {
+
+// Cost of half-angle slicing: traversals, particles sorted and projected, slices, texels of the
+// light buffer copied and blurred between slices, fragments of the eye and of the light.
+std::vector<double> HalfAngleCost(const SceneFeatures& features, const Settings& settings) {
+  const double lights = std::max(1.0, static_cast<double>(features.lights.size()));
+  const double texels = 1.0 * settings.shadow.light_buffer_size * settings.shadow.light_buffer_size;
+  const double slices = features.lights.empty() ? 0.0 : settings.shadow.slices * lights;
+  const double per_sample = 1.0 / (settings.sampling.downsample * settings.sampling.downsample);
+  double deposited = 0.0;
+  for (const LightFeatures& light : features.lights) deposited += light.quad_area * texels;
+  return {lights,
+          lights * features.particles,
+          slices,
+          slices * texels,
+          features.scatters ? slices * texels : 0.0,
+          lights * features.quad_samples * per_sample,
+          deposited,
+          lights * features.samples * per_sample};
+}
+
+// Of one light that casts shadows. The constants fit frames 24, 32 and 40 of the plume, thin and
+// dense, 10 to 165 degrees between view and light, within a factor of 1.5.
+struct LightError {
+  double tilt;    // of the axis away from the light; no slicing helps
+  double slices;  // their thickness, in optical depth
+  double texels;  // their size against the particles'
+};
+
+LightError HalfAngleLightError(const LightFeatures& light, const ShadowSettings& shadow) {
+  constexpr double kDensePlume = 15.0;  // the depth at which the constants hold as they stand
+  const double sine = std::sqrt(0.5 * (1.0 - std::abs(light.cosine)));  // of the tilt
+  const double thickness = std::sqrt(std::min(1.0, light.depth / kDensePlume));
+  const double back = std::clamp(-light.cosine / 0.6, 0.0, 1.0);
+  const double tilt = light.cosine > 0.0 ? 0.32 * sine : 0.08 * sine + 0.45 * sine * sine * sine;
+  const double texels_per_radius = light.radius * shadow.light_buffer_size;
+  return {std::min(1.0, tilt) * thickness,
+          std::min(1.0, (1.0 - 0.55 * back) * 0.25 * std::pow(light.depth / shadow.slices, 0.58)),
+          std::min(1.0, 0.45 * thickness / (texels_per_radius * texels_per_radius))};
+}
+
+std::vector<double> HalfAngleError(const SceneFeatures& features, const Settings& settings) {
+  constexpr double kRounding = 1e-4;  // 32-bit float in the blend units
+  LightError sum{};
+  for (const LightFeatures& light : features.lights) {
+    const LightError error = HalfAngleLightError(light, settings.shadow);
+    sum.tilt += light.share * error.tilt;
+    sum.slices += light.share * error.slices;
+    sum.texels += light.share * error.texels;
+  }
+  const double radius = features.radius_samples / settings.sampling.downsample;
+  const double downsampling =
+      settings.sampling.downsample > 1 ? std::min(1.0, 0.16 * std::pow(radius, -1.2)) : 0.0;
+  return {sum.tilt * sum.tilt + kRounding * kRounding, sum.slices * sum.slices,
+          sum.texels * sum.texels, downsampling * downsampling};
+}
+
+// Of image and light buffer, by a cloud.
+constexpr double kCovered = 0.4;
+
+// What a sum along a ray still costs once what follows cannot be seen: the reference stops there.
+double SeenShare(double depth) {
+  constexpr double kOpaque = 24.0;  // -ln of its tolerance
+  return depth > kOpaque ? kOpaque / depth : 1.0;
+}
+
+// Particles indexed, samples, particles met by them, and light rays' sums at those.
+std::vector<double> ReferenceCostOf(const SceneFeatures& features, double samples) {
+  constexpr double kDisk = 0.785;  // of a quad
+  const double meets = kDisk * features.quad_samples / std::max(1.0, kCovered * features.samples);
+  const double hits = samples * kCovered * meets * SeenShare(0.5 * meets * features.optical_depth);
+  double summed = 0.0;
+  for (const LightFeatures& light : features.lights) {
+    summed += hits * kDisk * light.quad_area / kCovered * SeenShare(light.depth / kCovered);
+  }
+  const double indexed = features.particles * (1.0 + static_cast<double>(features.lights.size()));
+  return {indexed, hits, summed, samples};
+}
+
+std::vector<double> ReferenceCost(const SceneFeatures& features, const Settings& /*settings*/) {
+  return ReferenceCostOf(features, features.samples);
+}
+
+std::vector<double> ReferenceError(const SceneFeatures& /*features*/, const Settings& /*all*/) {
+  constexpr double kRounding = 1e-6;  // of the image's 32-bit floats
+  return {kRounding * kRounding};
+}
+
+// Sizes at which a particle's radius takes about two, four and eight texels: the error of coarser
+// ones outweighs all others, and finer ones show no difference (docs/target-error.md).
+std::vector<int> LightBufferSizes(const SceneFeatures& features, const TargetLimits& limits) {
+  double radius = 1.0;
+  for (const LightFeatures& light : features.lights) radius = std::min(radius, light.radius);
+  std::vector<int> sizes;
+  for (const double texels : {2.0, 4.0, 8.0}) {
+    const double wanted = std::exp2(std::round(std::log2(texels / std::max(radius, 1e-6))));
+    const int size = static_cast<int>(
+        std::clamp(wanted, 64.0, static_cast<double>(std::max(64, limits.max_light_buffer_size))));
+    sizes.push_back(std::min(size, limits.max_light_buffer_size));
+  }
+  sizes.erase(std::unique(sizes.begin(), sizes.end()), sizes.end());
+  return sizes;
+}
+
+// Interpolated always: plain slicing takes as long, and is as right only where light comes from
+// behind at high slice counts, where interpolation is within a percent of it.
+void ListHalfAngle(const Scene& scene, const SceneFeatures& features,
+                   std::span<const ImageRequest> /*images*/, const TargetLimits& limits,
+                   Candidates& candidates) {
+  for (const LightFeatures& light : features.lights) {
+    if (!light.among_particles) continue;
+    candidates.refusals.push_back(
+        "HALF_ANGLE needs point lights that cast shadows outside the particles");
+    return;
+  }
+  ShadowSettings shadow = scene.shadow;
+  shadow.technique = ShadowTechniqueKind::kHalfAngle;
+  shadow.interpolate = true;
+  const int most_slices =
+      static_cast<int>(std::clamp(features.particles, 1.0, static_cast<double>(limits.max_slices)));
+  std::vector<int> slice_counts;
+  for (const int slices : {16, 32, 64, 128, 256, 512, 1024, 2048}) {
+    slice_counts.push_back(std::min(slices, most_slices));
+    if (slices >= most_slices || features.lights.empty()) break;
+  }
+  std::vector<int> sizes = LightBufferSizes(features, limits);
+  if (features.lights.empty()) sizes.resize(1);
+  for (const int downsample : {1, 2, 4}) {
+    if (downsample > 1 && (!limits.may_downsample || scene.sampling.supersample > 1)) break;
+    Sampling sampling = scene.sampling;
+    if (downsample > 1) sampling.downsample = downsample;
+    for (const int slices : slice_counts) {
+      for (const int size : sizes) {
+        shadow.slices = slices;
+        shadow.light_buffer_size = size;
+        candidates.settings.push_back({shadow, sampling});
+      }
+    }
+  }
+}
+
+void ListReference(const Scene& scene, const SceneFeatures& features,
+                   std::span<const ImageRequest> images, const TargetLimits& limits,
+                   Candidates& candidates) {
+  const auto refuse = [&](std::string reason) { candidates.refusals.push_back(std::move(reason)); };
+  if (features.scatters) {
+    return refuse("the scene scatters light, which REFERENCE cannot");
+  }
+  if (scene.sampling.downsample > 1) {
+    return refuse("the request downsamples, which REFERENCE cannot");
+  }
+  for (const ImageRequest& image : images) {
+    if (image.kind == ImageKind::kLightBuffer || image.kind == ImageKind::kLightLayers) {
+      return refuse("an output shows a light buffer, which REFERENCE has not");
+    }
+  }
+  const double work = ReferenceWork(scene);
+  if (work > limits.max_reference_work) {
+    return refuse(absl::StrCat("REFERENCE would need ", work,
+                               " samples times particles; the limit is ",
+                               limits.max_reference_work));
+  }
+  ShadowSettings shadow = scene.shadow;
+  shadow.technique = ShadowTechniqueKind::kReference;
+  candidates.settings.push_back({shadow, scene.sampling});
+}
+
+// Rates are milliseconds on two cores with the llvmpipe of Mesa 22.3.6, fitted to 470 frames of the
+// plume, 160 x 120 to 1280 x 1024; half of them lie within a factor of 1.2, nine in ten of 1.6.
+const std::vector<TechniqueModel>& Models() {
+  static const std::vector<TechniqueModel> models = {
+      {ShadowTechniqueKind::kHalfAngle,
+       "HALF_ANGLE",
+       ListHalfAngle,
+       HalfAngleCost,
+       {10.0, 1.4e-3, 0.07, 1.7e-8, 1e-7, 3e-5, 2.2e-6, 5e-6},
+       HalfAngleError,
+       4},
+      {ShadowTechniqueKind::kReference,
+       "REFERENCE",
+       ListReference,
+       ReferenceCost,
+       {5e-4, 3e-5, 2.9e-7, 4e-4},
+       ReferenceError,
+       1},
+  };
+  return models;
+}
+
+}  // namespace
+
+Candidates ListCandidates(const Scene& scene, const SceneFeatures& features,
+                          std::span<const ImageRequest> images, const TargetLimits& limits) {
+  Candidates candidates;
+  for (const TechniqueModel& model : TechniqueModels()) {
+    model.list(scene, features, images, limits, candidates);
+  }
+  return candidates;
+}
+
+std::span<const TechniqueModel> TechniqueModels() { return Models(); }
+
+const TechniqueModel& ModelOf(ShadowTechniqueKind kind) {
+  return Models()[static_cast<size_t>(kind)];
+}
+
+std::vector<double> MeasurementCostTerms(const SceneFeatures& features, double samples) {
+  // Covered samples meet particles, so that they cost more than samples of the whole window.
+  return ReferenceCostOf(features, std::min(samples / kCovered, features.samples));
+}
+
+std::string Describe(const Settings& settings) {
+  std::string text = ModelOf(settings.shadow.technique).name;
+  if (settings.shadow.technique != ShadowTechniqueKind::kReference) {
+    absl::StrAppend(&text, ", ", settings.shadow.slices, " slices, light buffer ",
+                    settings.shadow.light_buffer_size);
+  }
+  if (settings.sampling.downsample > 1) {
+    absl::StrAppend(&text, ", downsample ", settings.sampling.downsample);
+  }
+  return text;
+}
+
+}  // namespace halflight

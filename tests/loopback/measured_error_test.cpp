@@ -1,0 +1,211 @@
+// Stated errors against the truth, over the wire, with the real renderer: the plume drawn by
+// half-angle slicing, the reference itself, an empty image, scattering, downsampling.
+
+#include <cmath>
+#include <iostream>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/encode/decoded.h"
+#include "tests/loopback/test_server.h"
+#include "tests/loopback/wire_scene.h"
+#include "tests/oracle/plume.h"
+#include "tests/renderer/test_scene.h"
+
+namespace halflight::loopback {
+namespace {
+
+Scene Plume() {
+  Scene scene;
+  scene.particles = oracle::LoadPlume(std::string(HALFLIGHT_TEST_DATA) + "/plume/plume.0040.ply");
+  scene.camera = test::LookAt({0.5, 1.5, 4.6}, {0, 1.25, 0}, 160, 120);
+  scene.lights = {test::Sun({1, -0.6, -0.6})};
+  scene.material.radius = 0.045F;
+  scene.shadow.slices = 64;
+  scene.shadow.light_buffer_size = 256;
+  return scene;
+}
+
+// Asks for raw floats of these, without sending the particles.
+v1::RenderFrameRequest RequestOf(const Scene& scene, const std::vector<v1::OutputKind>& kinds) {
+  v1::RenderFrameRequest request = RequestWithoutParticles(scene);
+  for (const v1::OutputKind kind : kinds) {
+    *request.add_outputs() = OutputOf(kind);
+  }
+  return request;
+}
+
+// The truth, from a beauty and its error at every pixel.
+struct Truth {
+  double mse = 0.0;
+  double bias = 0.0;
+  double relative_rmse = 0.0;
+  double max = 0.0;
+  uint64_t covered = 0;
+
+  Truth(const std::vector<float>& beauty, const std::vector<float>& error) {
+    double reference = 0.0;
+    for (size_t i = 0; i < error.size() / 3; ++i) {
+      if (!(beauty.at(4 * i + 3) > 0.01F)) {
+        continue;
+      }
+      ++covered;
+      for (size_t c = 0; c < 3; ++c) {
+        const double off = error[3 * i + c];
+        mse += off * off;
+        bias += off;
+        reference += static_cast<double>(beauty[4 * i + c]) - off;
+        max = std::max(max, std::abs(off));
+      }
+    }
+    const double count = 3.0 * static_cast<double>(covered);
+    mse /= count;
+    bias /= count;
+    relative_rmse = std::sqrt(mse) / (reference / count);
+  }
+};
+
+class MeasuredError : public ::testing::Test {
+ protected:
+  client::RenderedFrame Render(const v1::RenderFrameRequest& request, const Scene& scene) {
+    const client::EncodedParticles particles = Encoded(*scene.particles);
+    return MustRender(client_, request, &particles);
+  }
+
+  const TestServer server_;
+  client::Client client_ = server_.Connect();
+};
+
+bool Holds(const v1::EstimatedFigure& figure, double truth) {
+  return figure.low() <= truth && truth <= figure.high();
+}
+
+TEST_F(MeasuredError, OfThePlumeHoldsTheTrueOne) {
+  const Scene scene = Plume();
+  ASSERT_NE(scene.particles, nullptr);
+  const auto whole =
+      Render(RequestOf(scene, {v1::OUTPUT_KIND_BEAUTY, v1::OUTPUT_KIND_ERROR}), scene);
+  const std::vector<float> beauty = FloatsOf(whole.outputs[0]);
+  const Truth truth(beauty, FloatsOf(whole.outputs[1]));
+  ASSERT_GT(truth.covered, 2000U);
+  EXPECT_GT(truth.relative_rmse, 0.01) << "half-angle slicing is not that good";
+  EXPECT_EQ(whole.header.error().sampled_pixels(), truth.covered);
+  EXPECT_NEAR(whole.header.error().relative_rmse().value(), truth.relative_rmse, 1e-9);
+
+  v1::RenderFrameRequest request = RequestOf(scene, {v1::OUTPUT_KIND_BEAUTY});
+  request.mutable_measure_error()->set_seed(5);  // of a hundred seeds, intervals miss with five
+  const auto sampled = Render(request, scene);
+  EXPECT_EQ(FloatsOf(sampled.outputs[0]), beauty) << "measuring does not change the frame";
+  const v1::MeasuredError& error = sampled.header.error();
+  std::cout << "relative RMSE " << truth.relative_rmse << ", measured "
+            << error.relative_rmse().ShortDebugString() << "\n";
+  EXPECT_EQ(error.compared(), v1::COMPARED_FRAME_RETURNED);
+  EXPECT_EQ(error.covered_pixels(), truth.covered);
+  EXPECT_EQ(error.sampled_pixels(), 1024U);
+  EXPECT_TRUE(Holds(error.mean_square_error(), truth.mse));
+  EXPECT_TRUE(Holds(error.bias(), truth.bias));
+  EXPECT_TRUE(Holds(error.rmse(), std::sqrt(truth.mse)));
+  EXPECT_TRUE(Holds(error.relative_rmse(), truth.relative_rmse));
+  EXPECT_LT(error.relative_rmse().high(), 1.5 * error.relative_rmse().low());
+  EXPECT_LE(error.sample_max(), truth.max);
+
+  // Two ways to the same figures: the map's pixels, and samples of all of them.
+  request.mutable_measure_error()->set_samples(1048576);
+  const v1::MeasuredError all = Render(request, scene).header.error();
+  EXPECT_EQ(all.sampled_pixels(), truth.covered);
+  EXPECT_NEAR(all.relative_rmse().value(), truth.relative_rmse, 1e-6);
+  EXPECT_NEAR(all.bias().value(), truth.bias, 1e-6);
+  EXPECT_NEAR(all.sample_max(), truth.max, 1e-6);
+}
+
+TEST_F(MeasuredError, OfTheReferenceIsRoundingAlone) {
+  Scene scene = test::BallScene(300, 48);
+  v1::RenderFrameRequest request =
+      RequestOf(scene, {v1::OUTPUT_KIND_BEAUTY, v1::OUTPUT_KIND_ERROR});
+  request.mutable_scene()->mutable_shadow()->set_technique(v1::SHADOW_TECHNIQUE_REFERENCE);
+  const auto map = Render(request, scene);
+  for (const float off : FloatsOf(map.outputs[1])) {
+    EXPECT_LT(std::abs(off), 1e-6F);
+  }
+  request.mutable_outputs()->RemoveLast();
+  request.mutable_measure_error();
+  const v1::MeasuredError error = Render(request, scene).header.error();
+  EXPECT_GT(error.sampled_pixels(), 500U);
+  EXPECT_LT(error.relative_rmse().high(), 1e-6);
+  EXPECT_LT(error.sample_max(), 1e-6);
+}
+
+TEST_F(MeasuredError, OfAnEmptyImageIsZero) {
+  Scene scene = test::BallScene(300, 48);
+  scene.camera = test::LookAt({0, 0, 4}, {0, 0, 8}, 48, 48);
+  v1::RenderFrameRequest request = RequestOf(scene, {v1::OUTPUT_KIND_BEAUTY});
+  request.mutable_measure_error();
+  for (const bool map : {false, true}) {
+    if (map) {
+      *request.add_outputs() = OutputOf(v1::OUTPUT_KIND_ERROR);
+    }
+    const auto frame = Render(request, scene);
+    const v1::MeasuredError& error = frame.header.error();
+    EXPECT_TRUE(frame.header.has_error());
+    EXPECT_EQ(error.covered_pixels(), 0U);
+    EXPECT_EQ(error.relative_rmse().high(), 0.0);
+    EXPECT_EQ(error.sample_worst_size(), 0);
+  }
+}
+
+TEST_F(MeasuredError, OfScatteringIsThatOfTheFrameWithout) {
+  Scene scene = test::BallScene(300, 48);
+  v1::RenderFrameRequest plain = RequestOf(scene, {v1::OUTPUT_KIND_BEAUTY, v1::OUTPUT_KIND_ERROR});
+  const auto without = Render(plain, scene);
+  scene.material.scattering_spread = 0.3F;
+  const auto with =
+      Render(RequestOf(scene, {v1::OUTPUT_KIND_BEAUTY, v1::OUTPUT_KIND_ERROR}), scene);
+  EXPECT_NE(with.outputs[0], without.outputs[0]);
+  EXPECT_EQ(with.outputs[1], without.outputs[1]);
+  EXPECT_EQ(with.header.error().compared(), v1::COMPARED_FRAME_WITHOUT_SCATTERING);
+  EXPECT_EQ(without.header.error().compared(), v1::COMPARED_FRAME_RETURNED);
+  EXPECT_EQ(with.header.error().rmse().value(), without.header.error().rmse().value());
+}
+
+TEST_F(MeasuredError, CountsWhatDownsamplingLoses) {
+  Scene scene = test::BallScene(300, 48);
+  v1::RenderFrameRequest request = RequestOf(scene, {v1::OUTPUT_KIND_BEAUTY});
+  request.mutable_measure_error();
+  const double full = Render(request, scene).header.error().relative_rmse().value();
+  request.mutable_scene()->mutable_sampling()->set_downsample(4);
+  const v1::MeasuredError coarse = Render(request, scene).header.error();
+  EXPECT_GT(coarse.relative_rmse().low(), full);
+  EXPECT_LT(coarse.relative_rmse().high(), 1.0);
+}
+
+TEST_F(MeasuredError, IsInTheFilesAndPlacedInTheCrop) {
+  Scene scene = test::BallScene(300, 64);
+  scene.camera.window = {16, 24, 32, 20};
+  v1::RenderFrameRequest request = RequestOf(scene, {v1::OUTPUT_KIND_ERROR});
+  request.clear_outputs();
+  *request.add_outputs() = OutputOf(v1::OUTPUT_KIND_BEAUTY, v1::IMAGE_FORMAT_EXR_HALF);
+  *request.add_outputs() = OutputOf(v1::OUTPUT_KIND_BEAUTY, v1::IMAGE_FORMAT_PNG8);
+  *request.add_outputs() = OutputOf(v1::OUTPUT_KIND_ERROR);
+  const auto frame = Render(request, scene);
+  const v1::MeasuredError& error = frame.header.error();
+  for (const auto& [bytes, format] :
+       {std::pair(frame.outputs[0], "exr"), std::pair(frame.outputs[1], "png")}) {
+    const auto parts = Decode(bytes, format);
+    ASSERT_EQ(parts.size(), 1U);
+    const auto& texts = parts[0].texts;
+    ASSERT_EQ(texts.count("halflight:error.relativeRmse"), 1U);
+    EXPECT_NEAR(std::stod(texts.at("halflight:error.relativeRmse")), error.relative_rmse().value(),
+                1e-5);
+    EXPECT_EQ(texts.at("halflight:error.compared"), "COMPARED_FRAME_RETURNED");
+  }
+  const std::vector<float> map = FloatsOf(frame.outputs[2]);
+  ASSERT_EQ(map.size(), 3U * 32U * 20U);
+  ASSERT_GT(error.sample_worst_size(), 0);
+  for (const v1::PixelError& worst : error.sample_worst()) {
+    EXPECT_EQ(static_cast<float>(worst.g()), map.at(3 * (worst.y() * 32 + worst.x()) + 1));
+  }
+}
+
+}  // namespace
+}  // namespace halflight::loopback
