@@ -120,7 +120,8 @@ struct Kernels {
   void (*composite_image_tile)(const ImageTileJob& job);
 };
 
-// For the CPU this runs on.
+// For the CPU this runs on, and for any.
 const Kernels& BestKernels();
+const Kernels& BaselineKernels();
 
 }  // namespace halflight::sweep

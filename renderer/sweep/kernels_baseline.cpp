@@ -24,4 +24,6 @@ const Kernels& BestKernels() {
   return baseline::kKernels;
 }
 
+const Kernels& BaselineKernels() { return baseline::kKernels; }
+
 }  // namespace halflight::sweep

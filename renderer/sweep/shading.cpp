@@ -15,6 +15,7 @@ namespace halflight::sweep {
 namespace {
 
 static_assert(kMaxTileLights >= 2 * kMaxLights);
+static_assert(kMaxDegree == kMaxFitDegree);
 
 using Coefficients = std::array<float, Terms(kMaxDegree)>;
 
