@@ -4,6 +4,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "renderer/frame.h"
+#include "renderer/projection.h"
 #include "renderer/reference_frame.h"
 #include "renderer/shadow_technique.h"
 #include "renderer/sweep/sweep_frame.h"
@@ -35,7 +36,8 @@ void DescribePasses(const Scene& scene, FramePlan& plan) {
         plan.passes.push_back(std::move(pass));
       }
     } else {
-      plan.passes.push_back({"sort by distance from the eye", "nothing casts shadows", 1});
+      plan.passes.push_back({traversal.axis ? "sort by depth" : "sort by distance from the eye",
+                             "nothing casts shadows", 1});
       plan.passes.push_back({"project particles for the eye", "every traversal", 1});
       plan.passes.push_back({"composite", "the image", 1});
     }
@@ -92,8 +94,14 @@ absl::StatusOr<FramePlan> PlanFrame(const FrameRequest& request, const ParticleV
     KeepWhatOutputsShow(request.images, *traversal);
     plan.traversals.push_back(*std::move(traversal));
   }
-  // Without shadows: one walk in the order of distance from the eye, as the image model asks.
-  if (plan.traversals.empty()) plan.traversals.emplace_back();
+  // Without shadows: one walk in the order of distance from the eye, as the image model asks; of
+  // parallel rays, each from an eye of its own, that is the depth along them.
+  if (plan.traversals.empty()) {
+    plan.traversals.emplace_back();
+    if (std::holds_alternative<Orthographic>(scene.camera.projection)) {
+      plan.traversals.front().axis = ViewDirection(scene.camera);
+    }
+  }
   plan.traversals.front().ambient_and_emission = true;
   plan.traversals.front().unshadowed_lights = std::move(unshadowed);
 

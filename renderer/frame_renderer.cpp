@@ -150,6 +150,7 @@ absl::StatusOr<FrameResult> FrameRenderer::Render(const FrameRequest& request,
     return FinishFrame(request, *drawn, *std::move(plan), std::move(reports), particles, clock);
   }
   if (absl::Status status = CheckTargetSize(*plan, device()); !status.ok()) return status;
+  gl::ForgetErrors();
 
   // Bring particles and camera to the device.
   clock.BeginCpu("upload");

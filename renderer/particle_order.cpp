@@ -81,7 +81,8 @@ ParticleOrder OrderParticles(const ParticleView& particles, const Traversal& tra
 
   ParticleOrder order;
   const size_t slices = std::clamp<size_t>(count, 1, static_cast<size_t>(traversal.slices));
-  order.slice_begin = traversal.spacing == SliceSpacing::kEqualCount
+  // As many slices as particles are one particle each, whatever their weights.
+  order.slice_begin = traversal.spacing == SliceSpacing::kEqualCount || slices == count
                           ? CutByCount(count, slices)
                           : CutByOpticalDepth(particles, sorted, slices);
   order.particles = PlaceInSlices(sorted, order.slice_begin);

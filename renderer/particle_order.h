@@ -23,7 +23,8 @@ struct ParticleOrder {
 };
 
 // Sorts by the traversal's axis, or by distance from the eye (`eye` is relative to the set's
-// origin), and cuts into the traversal's slices: every particle falls into exactly one.
+// origin), and cuts into the traversal's slices: every particle falls into exactly one, and alone
+// where there are no fewer slices than particles.
 ParticleOrder OrderParticles(const ParticleView& particles, const Traversal& traversal,
                              const glm::dvec3& eye);
 

@@ -77,6 +77,21 @@ PlaneBounds BoundsInPlane(const Projection& projection, const ParticleView& part
   return bounds;
 }
 
+// Whether any particle, its radius times `enlarged`, reaches the plane through `point` across the
+// unit vector `forward`.
+bool ReachesPlane(const glm::dvec3& point, const glm::dvec3& forward, double enlarged,
+                  const ParticleView& particles) {
+  const double origin_depth = glm::dot(forward, particles.set().origin - point);
+  std::atomic<bool> reaches = false;
+  ParallelRanges(particles.size(), [&](const WorkRange& range) {
+    for (size_t i = range.begin; i < range.end && !reaches; ++i) {
+      const double depth = origin_depth + glm::dot(forward, glm::dvec3(particles.positions()[i]));
+      if (depth < enlarged * particles.radius(i)) reaches = true;
+    }
+  });
+  return reaches;
+}
+
 }  // namespace
 
 glm::dmat4 Projection::texture_from_world() const {
@@ -100,10 +115,16 @@ glm::dvec3 Projection::eye() const {
   return -glm::transpose(glm::dmat3(view_from_world)) * glm::dvec3(view_from_world[3]);
 }
 
-shader::ProjectionBlock Projection::block(const glm::dvec3& set_origin) const {
+shader::ProjectionBlock Projection::block(const ParticleView& particles) const {
+  const glm::dvec3 eye_from_origin = eye() - particles.set().origin;
+  // The place among the particles that is nearest the eye, in float32 as the shader has it.
+  const glm::vec3 near(
+      glm::clamp(eye_from_origin, particles.bounds().low, particles.bounds().high));
   shader::ProjectionBlock block;
   block.view_from_world = glm::mat4(glm::mat3(view_from_world));
-  block.origin_from_eye = glm::vec4(set_origin - eye(), 0.0F);
+  block.near_translation = glm::vec4(-near, 0.0F);
+  block.far_translation =
+      glm::vec4(glm::dmat3(view_from_world) * (glm::dvec3(near) - eye_from_origin), 0.0F);
   block.pixel_from_plane = glm::vec4(pixel_from_plane, pixel_offset);
   block.plane_from_pixel = glm::vec4(1.0 / pixel_from_plane, -pixel_offset / pixel_from_plane);
   block.target_size = glm::vec4(size, least_radius, 0.0F);
@@ -128,17 +149,19 @@ Projection EyeProjection(const Camera& camera, const glm::ivec2& target_size, do
   return projection;
 }
 
+glm::dvec3 ViewDirection(const Camera& camera) {
+  return -glm::normalize(glm::dvec3(glm::row(camera.view_from_world, 2)));
+}
+
 bool ReachesEyePlane(const Projection& projection, const ParticleView& particles) {
   const glm::dvec3 forward = -glm::dvec3(glm::row(projection.view_from_world, 2));
-  const double origin_depth = glm::dot(forward, particles.set().origin - projection.eye());
-  std::atomic<bool> reaches = false;
-  ParallelRanges(particles.size(), [&](const WorkRange& range) {
-    for (size_t i = range.begin; i < range.end && !reaches; ++i) {
-      const double depth = origin_depth + glm::dot(forward, glm::dvec3(particles.positions()[i]));
-      if (depth < 1.001 * particles.radius(i)) reaches = true;
-    }
-  });
-  return reaches;
+  return ReachesPlane(projection.eye(), forward, 1.001, particles);
+}
+
+bool LiesAmong(const Light& light, const ParticleView& particles) {
+  const auto* point = std::get_if<PointLight>(&light.kind);
+  return point != nullptr &&
+         ReachesPlane(point->position, TravelDirection(light, particles), 1.0, particles);
 }
 
 glm::dvec3 TravelDirection(const Light& light, const ParticleView& particles) {
@@ -146,7 +169,9 @@ glm::dvec3 TravelDirection(const Light& light, const ParticleView& particles) {
     return directional->direction;
   }
   const auto& point = std::get<PointLight>(light.kind);
-  return glm::normalize((particles.set().origin - point.position) + particles.bounds().center());
+  const glm::dvec3 to_center =
+      (particles.set().origin - point.position) + particles.bounds().center();
+  return to_center != glm::dvec3(0.0) ? glm::normalize(to_center) : glm::dvec3(0.0, -1.0, 0.0);
 }
 
 Projection LightProjection(const Light& light, const ParticleView& particles, int size,
@@ -172,7 +197,9 @@ Projection LightProjection(const Light& light, const ParticleView& particles, in
   const glm::dmat3 rotation(projection.view_from_world);
   const double center_depth =
       -(rotation * (center + (particles.set().origin - projection.eye()))).z;
-  const double widen = projection.orthographic ? spread : spread / center_depth;
+  // Slopes from a point light; no particles are at no depth.
+  const double widen =
+      projection.orthographic || particles.size() == 0 ? spread : spread / center_depth;
   const glm::dvec2 low = bounds.low - widen;
   const glm::dvec2 high = bounds.high + widen;
   const glm::dvec2 texels_per_unit = (size - 2.0 * kBorderTexels) / (high - low);

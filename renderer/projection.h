@@ -26,13 +26,16 @@ struct Projection {
   [[nodiscard]] glm::dmat4 texture_from_world() const;
   // Position of the eye (or light) in the world.
   [[nodiscard]] glm::dvec3 eye() const;
-  // The uniform block, for a set with this origin.
-  [[nodiscard]] shader::ProjectionBlock block(const glm::dvec3& set_origin) const;
+  // The uniform block, for these particles.
+  [[nodiscard]] shader::ProjectionBlock block(const ParticleView& particles) const;
 };
 
 // The eye's projection onto a target that samples the camera's window with `samples` samples a
 // pixel along each side (below 1: fewer samples than pixels).
 Projection EyeProjection(const Camera& camera, const glm::ivec2& target_size, double samples);
+
+// Along which the camera looks, in the world. Unit length.
+glm::dvec3 ViewDirection(const Camera& camera);
 
 // Whether any particle reaches the plane through the projection's eye, or comes so near to it that
 // rounding may tell otherwise.
@@ -40,12 +43,16 @@ bool ReachesEyePlane(const Projection& projection, const ParticleView& particles
 
 // A projection from a light onto a square light buffer, fitted to the particles: shows all of each
 // of them and leaves only the border that filtering needs. `spread` widens the border by that many
-// world units for light that scatters sideways. A point light must lie outside the particles.
+// world units for light that scatters sideways. A point light must not lie among the particles.
 Projection LightProjection(const Light& light, const ParticleView& particles, int size,
                            double spread);
 
+// Whether some particle reaches the plane through a point light, across the direction in which its
+// light travels at the particles: then no one frustum shows them all. Never so for other lights.
+bool LiesAmong(const Light& light, const ParticleView& particles);
+
 // The direction in which light travels at the particles: towards the centre of their bounds for a
-// point light. Unit length.
+// point light; downward, should it stand right there. Unit length.
 glm::dvec3 TravelDirection(const Light& light, const ParticleView& particles);
 
 }  // namespace halflight

@@ -71,7 +71,11 @@ HALFLIGHT_CONSTANT(kMaxBlurRadius, 63);  // texels to each side
 // Pixel coordinates count from the target's first row, which is the top of the image.
 struct ProjectionBlock {
   mat4 view_from_world;   // rotation only
-  vec4 origin_from_eye;   // xyz: particle origin minus eye, world axes
+  // Particle origin minus eye, in two parts (xyz): near_translation, world axes, is added before the
+  // rotation, far_translation, view axes, after it. Near the eye the first sum is exact; far from it
+  // the second leaves what lies across the view its digits.
+  vec4 near_translation;
+  vec4 far_translation;
   vec4 pixel_from_plane;  // xy: scale, zw: offset
   vec4 plane_from_pixel;  // the inverse
   vec4 target_size;       // xy: pixels; z: radii below this are drawn as this (plane units)

@@ -48,10 +48,9 @@ void main() {
   float radius = kHasRadii ? radii[i] : particles.uniforms.x;
   float optical_depth = kHasOpticalDepths ? optical_depths[i] : particles.uniforms.y;
 
-  // Translate before rotating: near the eye the sum is exact.
   vec3 offset = vec3(positions[3u * i], positions[3u * i + 1u], positions[3u * i + 2u]) +
-                projection.origin_from_eye.xyz;
-  vec3 view = mat3(projection.view_from_world) * offset;
+                projection.near_translation.xyz;
+  vec3 view = mat3(projection.view_from_world) * offset + projection.far_translation.xyz;
   float w = -view.z;
 
   // A light buffer cannot show particles smaller than its texels: enlarge them, keeping the

@@ -4,11 +4,15 @@
 
 namespace halflight::gl {
 
+void ForgetErrors() {
+  while (glGetError() != GL_NO_ERROR) {
+  }
+}
+
 absl::Status CheckErrors(const char* where) {
   const GLenum error = glGetError();
   if (error == GL_NO_ERROR) return absl::OkStatus();
-  while (glGetError() != GL_NO_ERROR) {
-  }
+  ForgetErrors();
   if (error == GL_OUT_OF_MEMORY) {
     return absl::ResourceExhaustedError(absl::StrCat(where, ": the device is out of memory"));
   }

@@ -18,6 +18,9 @@ class DebugScope {
   DebugScope& operator=(const DebugScope&) = delete;
 };
 
+// Forgets what GL reported so far: what a frame that ended early left behind is not the next one's.
+void ForgetErrors();
+
 // OK, or an error with the name of `where` and what GL reported since the last call:
 // ResourceExhausted when the device is out of memory, else Internal.
 absl::Status CheckErrors(const char* where);

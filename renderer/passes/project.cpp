@@ -16,7 +16,7 @@ const gl::ProgramSource& ProjectProgram() {
 }  // namespace
 
 TargetProjection UploadProjection(const Projection& projection, const ParticleView& particles) {
-  return {projection, gl::MakeBlock("projection", projection.block(particles.set().origin))};
+  return {projection, gl::MakeBlock("projection", projection.block(particles))};
 }
 
 absl::StatusOr<gl::Buffer> ProjectParticles(Gpu& gpu, const ParticleBuffers& particles,

@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include <glm/geometric.hpp>
-#include <glm/gtc/matrix_access.hpp>
 
 #include "absl/strings/str_cat.h"
 #include "renderer/frame.h"
@@ -13,10 +12,6 @@
 namespace halflight {
 
 namespace {
-
-glm::dvec3 ViewDirection(const Camera& camera) {
-  return -glm::normalize(glm::dvec3(glm::row(camera.view_from_world, 2)));
-}
 
 // World units by which light that crosses the whole cloud has spread sideways, thrice the standard
 // deviation; never so much that the cloud itself shrinks to nothing in the light buffer.
@@ -79,6 +74,13 @@ HalfAngleAxis ComputeHalfAngleAxis(const glm::dvec3& view, const glm::dvec3& lig
 absl::StatusOr<Traversal> HalfAngle::PlanLight(const Scene& scene, const ParticleView& particles,
                                                int light) const {
   const Light& source = scene.lights[static_cast<size_t>(light)];
+  if (LiesAmong(source, particles)) {
+    const glm::dvec3& at = std::get<PointLight>(source.kind).position;
+    return absl::InvalidArgumentError(absl::StrCat(
+        "lighting.lights[", light, "].point.position: (", at.x, ", ", at.y, ", ", at.z,
+        "), allowed: outside the particles, for a light that casts shadows under technique "
+        "HALF_ANGLE"));
+  }
   const HalfAngleAxis half_angle =
       ComputeHalfAngleAxis(ViewDirection(scene.camera), TravelDirection(source, particles));
   Traversal traversal;

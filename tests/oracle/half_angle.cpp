@@ -61,9 +61,10 @@ HalfAngleOrder OrderByHalfAngle(const reference::Cloud& cloud, const reference::
                    [&keys](uint32_t a, uint32_t b) { return keys[a] < keys[b]; });
 
   const auto slices = static_cast<uint64_t>(settings.slices);
-  const std::vector<uint64_t> ends = settings.spacing == SliceSpacing::kEqualCount
-                                         ? EndsByCount(keys.size(), slices)
-                                         : EndsByOpticalDepth(cloud, result.order, slices);
+  const std::vector<uint64_t> ends =
+      settings.spacing == SliceSpacing::kEqualCount || slices >= keys.size()
+          ? EndsByCount(keys.size(), slices)
+          : EndsByOpticalDepth(cloud, result.order, slices);
   uint64_t begin = 0;
   for (const uint64_t end : ends) {
     for (uint64_t rank = begin; rank < end; ++rank) {

@@ -28,28 +28,11 @@ using reference::SceneOf;
 
 glm::dvec4 MiddlePixel(const OracleImage& image) { return image.rgba[image.rgba.size() / 2]; }
 
-TEST(Oracle, CoaxialParticlesMultiplyTheirTransparency) {
-  for (const bool flat : {false, true}) {
-    Scene scene = SceneOf(std::vector<glm::vec3>(7, glm::vec3(0.0F)));
-    if (flat) scene.camera.projection = Orthographic{3.0};
-    scene.material.opacity = 0.18F;
-    const double expected = 1.0 - std::pow(1.0 - 0.18F, 7);
-    EXPECT_NEAR(MiddlePixel(RenderUnshadowed(scene)).a, expected, 1e-12);
-    EXPECT_NEAR(MiddlePixel(RenderHalfAngle(scene)).a, expected, 1e-12);
-  }
-}
-
 TEST(Oracle, TwoParticlesShadeEachOtherAsByHand) {
-  // The light comes from the eye's side: the nearer particle shades the farther one.
-  Scene scene = SceneOf({{0.0F, 0.0F, 1.0F}, {0.0F, 0.0F, -1.0F}});
-  Light light;
-  light.kind = DirectionalLight{{0.0, 0.0, -1.0}};
-  light.shadow_density = {1.0F, 2.0F, 0.0F};
-  scene.lights = {light};
+  const reference::ShadedPair pair;
+  Scene scene = pair.scene;
+  const glm::dvec4& expected = pair.middle_pixel;
   scene.shadow.slices = 2;
-  // 0.5 of the near one's light, then a quarter of what reaches the far one.
-  const glm::dvec4 expected(0.5 + 0.25 * 0.5, 0.5 + 0.25 * 0.25, 0.5 + 0.25, 0.75);
-  ExpectNear(MiddlePixel(RenderExact(scene)), expected);
   ExpectNear(MiddlePixel(RenderHalfAngle(scene)), expected);
   // In one slice, interpolated: the second sees all of the slice but itself, the first nothing.
   scene.shadow.slices = 1;

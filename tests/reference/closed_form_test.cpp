@@ -79,15 +79,8 @@ TEST(Reference, OpacityOneIsDrawnAsTheLargest) {
 }
 
 TEST(Reference, TwoParticlesShadeEachOtherAsByHand) {
-  // The light comes from the eye's side: the nearer particle shades the farther one.
-  Scene scene = SceneOf({{0.0F, 0.0F, 1.0F}, {0.0F, 0.0F, -1.0F}});
-  Light light;
-  light.kind = DirectionalLight{{0.0, 0.0, -1.0}};
-  light.shadow_density = {1.0F, 2.0F, 0.0F};
-  scene.lights = {light};
-  // 0.5 of the near one's light, then a quarter of what reaches the far one.
-  const glm::dvec4 expected(0.5 + 0.25 * 0.5, 0.5 + 0.25 * 0.25, 0.5 + 0.25, 0.75);
-  ExpectNear(MiddlePixel(scene), expected);
+  const ShadedPair pair;
+  ExpectNear(MiddlePixel(pair.scene), pair.middle_pixel);
 }
 
 TEST(Reference, ALightAmongParticlesIsShadedOnEachSideByThatSideAlone) {

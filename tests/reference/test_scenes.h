@@ -1,5 +1,5 @@
 // Small scenes whose rays are known, for the tests of the reference.
-// Holds no expected images.
+// Holds no expected images but one pixel.
 #pragma once
 
 #include <cmath>
@@ -38,6 +38,20 @@ inline Scene SceneOf(std::vector<glm::vec3> positions, int size = 33) {
   scene.particles = set;
   return scene;
 }
+
+// Two particles behind each other, lit from the eye's side: the nearer shades the farther.
+struct ShadedPair {
+  Scene scene = SceneOf({{0.0F, 0.0F, 1.0F}, {0.0F, 0.0F, -1.0F}});
+  // Half of the near one's light, then a quarter of what reaches the far one.
+  glm::dvec4 middle_pixel{0.5 + 0.25 * 0.5, 0.5 + 0.25 * 0.25, 0.5 + 0.25, 0.75};
+
+  ShadedPair() {
+    Light light;
+    light.kind = DirectionalLight{{0.0, 0.0, -1.0}};
+    light.shadow_density = {1.0F, 2.0F, 0.0F};
+    scene.lights = {light};
+  }
+};
 
 // Particles of random place, radius, opacity and colour in a box round the origin.
 inline Scene RandomScene(size_t count, int size, unsigned seed = 7) {

@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <cstring>
+#include <string>
 
 #include "tests/renderer/gl_fixture.h"
 
@@ -194,6 +195,60 @@ TEST_F(Frame, IsCancelledWhenAskedTo) {
   stop.request_stop();
   const auto frame = Renderer().Render(test::Beauty(test::BallScene(100)), stop.get_token());
   EXPECT_EQ(frame.status().code(), absl::StatusCode::kCancelled);
+}
+
+TEST_F(Frame, SeenAlongParallelRaysIsOrderedByDepth) {
+  // The second lies deeper, but nearer to the middle of the image.
+  Scene scene = test::BallScene(0);
+  auto set = std::make_shared<ParticleSet>();
+  set->positions = {{1.0F, 0.0F, 0.1F}, {0.8F, 0.0F, 0.0F}};
+  set->colors = {{1.0F, 0.0F, 0.0F}, {0.0F, 1.0F, 0.0F}};
+  scene.particles = set;
+  scene.camera = test::LookAt({0, 0, 1.5}, {0, 0, 0}, 97, 97);
+  scene.camera.projection = Orthographic{2.4};
+  scene.material.radius = 0.3F;
+  scene.material.opacity = 0.9F;
+  for (const float density : {0.0F, 1e-30F}) {
+    scene.lights = {test::Sun({0, 0, -1}, density)};
+    const Image image = RenderBeauty(scene);
+    const float* pixel = PixelAt(image, 48 + 36, 48);
+    EXPECT_GT(pixel[0], 2.0F * pixel[1]) << density;
+  }
+}
+
+TEST_F(Frame, DoesNotReportWhatOneThatEndedEarlyLeftBehind) {
+  const Scene scene = test::BallScene(10);
+  Renderer();
+  glEnable(0xFFFFFFFF);  // an error of GL, pending
+  EXPECT_TRUE(Renderer().Render(test::Beauty(scene), {}).ok());
+  EXPECT_EQ(glGetError(), GLenum{GL_NO_ERROR});
+}
+
+TEST_F(Frame, OfALightAmongTheParticlesIsRefusedByName) {
+  Scene scene = test::BallScene(100);
+  scene.lights.push_back(test::Sun({1, 0, 0}));
+  // In the middle, beside it, and where only the outermost reach.
+  for (const double z : {0.0, 0.5, 0.9}) {
+    scene.lights[1].kind = PointLight{{0.0, 0.0, z}};
+    const absl::Status status = Renderer().Render(test::Beauty(scene), {}).status();
+    EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument);
+    EXPECT_NE(status.message().find("lighting.lights[1].point.position: (0, 0, "),
+              std::string::npos)
+        << status;
+  }
+  scene.lights[1].shadow_density = glm::vec3(0.0F);  // it may stand anywhere
+  EXPECT_TRUE(Renderer().Render(test::Beauty(scene), {}).ok());
+}
+
+TEST_F(Frame, OfNoParticlesAtTheLightsPlaceReportsNumbers) {
+  Scene scene = test::BallScene(0);
+  scene.lights[0].kind = PointLight{{0.0, 0.0, 0.0}};
+  const FrameResult frame = Render({scene, {{ImageKind::kLightBuffer}}});
+  for (int column = 0; column < 4; ++column) {
+    for (int row = 0; row < 4; ++row) {
+      EXPECT_TRUE(std::isfinite(frame.lights.at(0).light_texture_from_world[column][row]));
+    }
+  }
 }
 
 TEST_F(Frame, LargerThanTheDeviceAllowsIsRefusedByName) {

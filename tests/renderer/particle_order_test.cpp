@@ -49,6 +49,15 @@ TEST_P(Slices, HoldEveryParticleExactlyOnce) {
   EXPECT_TRUE(std::is_sorted(order.slice_begin.begin(), order.slice_begin.end()));
 }
 
+TEST_P(Slices, AreOneParticleEachWhereThereAreEnough) {
+  const ParticleOrder order = OrderParticles(ParticleView(scene_), traversal_, {});
+  if (static_cast<size_t>(GetParam().slices) < GetParam().particles) return;
+  ASSERT_EQ(order.slice_begin.size(), std::max<size_t>(GetParam().particles, 1) + 1);
+  for (size_t s = 0; s + 1 < order.slice_begin.size(); ++s) {
+    EXPECT_EQ(order.slice_begin[s], s);
+  }
+}
+
 TEST_P(Slices, FollowOneAnotherAlongTheAxis) {
   const ParticleOrder order = OrderParticles(ParticleView(scene_), traversal_, {});
   const auto at = [&](size_t k) {

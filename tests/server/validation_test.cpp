@@ -420,6 +420,28 @@ INSTANTIATE_TEST_SUITE_P(
               r.mutable_scene()->set_time_offset_s(1e9);
             },
             "scene.time_offset_s: 1000000000, which moves particle 1 to"},
+        Refusal{"PositionInfinite", [](Request& r) { Poke(r, 2, -kInf); },
+                "scene.inline_particles.position[0].z: -inf, allowed: [-1e+17, 1e+17]"},
+        Refusal{"RadiusNan", [](Request& r) { Poke(r, 7, kNan); },
+                "scene.inline_particles.radius[1]: nan"},
+        Refusal{"RadiusInfinite", [](Request& r) { Poke(r, 6, kInf); },
+                "scene.inline_particles.radius[0]: inf"},
+        Refusal{"RadiusDenormal", [](Request& r) { Poke(r, 7, 1e-40); },
+                "scene.inline_particles.radius[1]: 1e-40, allowed: [1e-15, 1e+17]"},
+        Refusal{
+            "OpacityNan",
+            [](Request& r) {
+              UseParticles(r, {v1::PARTICLE_ATTRIBUTE_POSITION, v1::PARTICLE_ATTRIBUTE_OPACITY});
+              Poke(r, 6, kNan);
+            },
+            "scene.inline_particles.opacity[0]: nan, allowed: [0, 1]"},
+        Refusal{
+            "EmissionInfinite",
+            [](Request& r) {
+              UseParticles(r, {v1::PARTICLE_ATTRIBUTE_POSITION, v1::PARTICLE_ATTRIBUTE_EMISSION});
+              Poke(r, 10, kInf);
+            },
+            "scene.inline_particles.emission[1].g: inf"},
         Refusal{"RadiusZero", [](Request& r) { Poke(r, 7, 0.0); },
                 "scene.inline_particles.radius[1]: 0, allowed: [1e-15, 1e+17]"},
         Refusal{"RadiusNegative", [](Request& r) { Poke(r, 6, -2.0); },
