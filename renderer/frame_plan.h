@@ -35,6 +35,7 @@ struct Traversal {
   int light_buffer_size = 0;          // texels along each side; 0: no light buffer
   bool colored_light_buffer = false;  // three channels: only where blur treats them differently
   bool blur = false;
+  bool keep_unscattered = false;  // of the light, only what is scattered spreads
   // What outputs show of this light: its transmittance at the particles that the eye sees, the
   // light buffer behind the last slice, the light buffer after every slice.
   bool keep_transmittance = false;

@@ -127,7 +127,7 @@ shader::ProjectionBlock Projection::block(const ParticleView& particles) const {
       glm::vec4(glm::dmat3(view_from_world) * (glm::dvec3(near) - eye_from_origin), 0.0F);
   block.pixel_from_plane = glm::vec4(pixel_from_plane, pixel_offset);
   block.plane_from_pixel = glm::vec4(1.0 / pixel_from_plane, -pixel_offset / pixel_from_plane);
-  block.target_size = glm::vec4(size, least_radius, 0.0F);
+  block.target_size = glm::vec4(size, least_radius, optical_depth_scale);
   return block;
 }
 

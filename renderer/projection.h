@@ -15,11 +15,12 @@ namespace halflight {
 struct Projection {
   glm::dmat4 view_from_world{1.0};  // rigid; x right, y up, looking along -z
   bool orthographic = false;
-  glm::ivec2 size{1};              // target, pixels
-  glm::dvec2 pixel_from_plane{1};  // scale
-  glm::dvec2 pixel_offset{0};      // pixel = plane * pixel_from_plane + pixel_offset
-  bool near_eye = false;           // particles may reach the plane through the eye
-  double least_radius = 0.0;       // plane units; smaller particles are drawn as large as this
+  glm::ivec2 size{1};                // target, pixels
+  glm::dvec2 pixel_from_plane{1};    // scale
+  glm::dvec2 pixel_offset{0};        // pixel = plane * pixel_from_plane + pixel_offset
+  bool near_eye = false;             // particles may reach the plane through the eye
+  double least_radius = 0.0;         // plane units; smaller particles are drawn as large as this
+  double optical_depth_scale = 1.0;  // of all particles
 
   // Maps world points to target coordinates: after division by w, (0, 0) is the outer corner of the
   // top left pixel and (1, 1) that of the bottom right one.

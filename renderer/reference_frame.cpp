@@ -41,6 +41,10 @@ absl::Status CheckScene(const Scene& scene) {
   } else if (scene.material.scattering_spread > 0.0F) {
     return Refuse("material.scattering_spread", absl::StrCat(scene.material.scattering_spread),
                   "0, since the image model has no scattering");
+  } else if (scene.material.scatters_physically()) {
+    return Refuse("material.physical_scattering.albedo",
+                  absl::StrCat(scene.material.physical_scattering->albedo),
+                  "0, since the image model has no scattering");
   }
   return absl::OkStatus();
 }

@@ -86,6 +86,12 @@ struct Light {
 
 enum class Profile : uint8_t { kSoft, kBall };
 
+// A medium that scatters light, after Henyey and Greenstein 1941.
+struct PhysicalScattering {
+  float mean_cosine = 0.0F;  // [0, 1)
+  float albedo = 1.0F;       // share of the light met that is scattered, not absorbed: [0, 1]
+};
+
 struct Material {
   Profile profile = Profile::kSoft;
   float radius = 0.0F;  // where the set has none
@@ -94,7 +100,13 @@ struct Material {
   glm::vec3 emission{0.0F};
   glm::vec3 ambient{0.1F};
   float phase_g = 0.0F;
+  // How light scatters on its way to a particle (docs/scattering.md); at most one of the two.
   float scattering_spread = 0.0F;  // world units of standard deviation at distance 1
+  std::optional<PhysicalScattering> physical_scattering;
+
+  [[nodiscard]] bool scatters_physically() const {
+    return physical_scattering && physical_scattering->albedo > 0.0F;
+  }
 };
 
 enum class ShadowTechniqueKind : uint8_t {
@@ -141,7 +153,7 @@ struct Scene {
   [[nodiscard]] bool scatters() const {
     const bool spreads = shadow.blur_mode == BlurMode::kTexelsPerSlice
                              ? shadow.blur_texels > 0.0F
-                             : material.scattering_spread > 0.0F;
+                             : material.scattering_spread > 0.0F || material.scatters_physically();
     return spreads && std::any_of(lights.begin(), lights.end(),
                                   [](const Light& light) { return light.casts_shadows(); });
   }

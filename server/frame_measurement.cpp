@@ -10,6 +10,7 @@ namespace halflight {
 FrameRequest WithoutScattering(const FrameRequest& request) {
   FrameRequest compared{request.scene, {{ImageKind::kBeauty}}};
   compared.scene.material.scattering_spread = 0.0F;
+  compared.scene.material.physical_scattering.reset();
   compared.scene.shadow.blur_mode = BlurMode::kDistance;
   compared.scene.shadow.blur_texels = 0.0F;
   return compared;

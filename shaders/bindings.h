@@ -61,6 +61,7 @@ HALFLIGHT_CONSTANT(kNearEyeConstant, 14);
 HALFLIGHT_CONSTANT(kColoredDensityConstant, 15);
 HALFLIGHT_CONSTANT(kVaryingLightsConstant, 16);
 HALFLIGHT_CONSTANT(kShadowLightVariesConstant, 17);
+HALFLIGHT_CONSTANT(kUnscatteredLightConstant, 18);
 
 HALFLIGHT_CONSTANT(kProjectGroupSize, 64);
 HALFLIGHT_CONSTANT(kMaxLightsInTraversal, 16);
@@ -78,7 +79,8 @@ struct ProjectionBlock {
   vec4 far_translation;
   vec4 pixel_from_plane;  // xy: scale, zw: offset
   vec4 plane_from_pixel;  // the inverse
-  vec4 target_size;       // xy: pixels; z: radii below this are drawn as this (plane units)
+  vec4 target_size;       // xy: pixels; z: radii below this are drawn as this (plane units);
+                          // w: scale of optical depths
 };
 
 // Values that serve where the particle set has no attribute of its own.
@@ -118,9 +120,9 @@ struct CompositeBlock {
 };
 
 struct BlurBlock {
-  uvec4 axis;                              // x, y: step in texels; z: radius in texels
-  vec4 density;                            // rgb shadow density of the light
-  vec4 weights[(kMaxBlurRadius + 1) / 4];  // by distance from the centre
+  uvec4 axis;                        // x, y: step in texels; z: radius in texels
+  vec4 density;                      // rgb shadow density of the light
+  vec4 weights[kMaxBlurRadius + 1];  // rgb, by distance from the centre
 };
 
 struct ResolveBlock {

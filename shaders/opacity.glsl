@@ -9,11 +9,11 @@ float OpacityFromOpticalDepth(float x) {
   return x < kSeriesLimit ? series : 1.0 - exp(-x);
 }
 
-// -log(1 - a) for an opacity a whose complement, 1 - a, is known by itself to all its digits. Below
-// the limit the series' rest is a^8 / 8 < 8e-9.
+// -log(1 - a) for an opacity a whose complement, 1 - a, is known by itself to all its digits; a may
+// be below 0, for light gained. Within the limit the series' rest is a^8 / 8 < 8e-9.
 float OpticalDepthFromOpacity(float a, float complement) {
   float series =
       a * (1.0 + a * (0.5 + a * (1.0 / 3.0 +
            a * (0.25 + a * (0.2 + a * (1.0 / 6.0 + a * (1.0 / 7.0)))))));
-  return a < kSeriesLimit ? series : -log(complement);
+  return abs(a) < kSeriesLimit ? series : -log(complement);
 }

@@ -47,6 +47,7 @@ void main() {
   uint i = order[place].index;
   float radius = kHasRadii ? radii[i] : particles.uniforms.x;
   float optical_depth = kHasOpticalDepths ? optical_depths[i] : particles.uniforms.y;
+  optical_depth *= projection.target_size.w;
 
   vec3 offset = vec3(positions[3u * i], positions[3u * i + 1u], positions[3u * i + 2u]) +
                 projection.near_translation.xyz;

@@ -144,8 +144,15 @@ void AddMaterialFlags(CLI::App& app, RenderOptions& options) {
                          "How particles thin out towards their edge; default: soft");
   AddNumber(app, "--phase-g", options.phase_g, {-1, 1, "a number > -1 and < 1", false, false},
             "Mean cosine of scattering; default: 0");
-  AddNumber(app, "--scattering", options.scattering_spread, kNotNegative,
-            "Sideways spread of light a world unit; default: 0");
+  auto* const spread = AddNumber(app, "--scattering", options.scattering_spread, kNotNegative,
+                                 "Sideways spread of light a world unit; default: 0");
+  AddNumber(app, "--scattering-g", options.scattering_g,
+            {0, 1, "a number >= 0 and < 1", true, false},
+            "Scatter light as a physical medium of this mean cosine does")
+      ->excludes(spread);
+  AddNumber(app, "--scattering-albedo", options.scattering_albedo, {0, 1, "a number from 0 to 1"},
+            "Share of the light that the physical medium scatters and does not absorb; default: 1")
+      ->excludes(spread);
 }
 
 void AddShadowFlags(CLI::App& app, RenderOptions& options) {

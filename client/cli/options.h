@@ -79,6 +79,8 @@ struct RenderOptions {
   std::optional<v1::Profile> profile;
   std::optional<double> phase_g;
   std::optional<double> scattering_spread;
+  std::optional<double> scattering_g;
+  std::optional<double> scattering_albedo;
 
   // Shadow and sampling.
   std::optional<v1::ShadowTechnique> technique;

@@ -232,6 +232,17 @@ void ApplyMaterial(const RenderOptions& options, v1::Scene& scene) {
   }
   if (options.scattering_spread) {
     scene.mutable_material()->set_scattering_spread(static_cast<float>(*options.scattering_spread));
+    scene.mutable_material()->clear_physical_scattering();
+  }
+  if (options.scattering_g || options.scattering_albedo) {
+    v1::PhysicalScattering& scattering = *scene.mutable_material()->mutable_physical_scattering();
+    scene.mutable_material()->clear_scattering_spread();
+    if (options.scattering_g) {
+      scattering.set_mean_cosine(static_cast<float>(*options.scattering_g));
+    }
+    if (options.scattering_albedo) {
+      scattering.set_albedo(static_cast<float>(*options.scattering_albedo));
+    }
   }
 }
 

@@ -1,7 +1,10 @@
 #include "renderer/passes/light_buffer.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
+
+#include <glm/common.hpp>
 
 #include "renderer/blur_kernel.h"
 #include "renderer/gl/debug.h"
@@ -30,18 +33,21 @@ const gl::ProgramSource& BlurProgram() {
 
 // One pass of the kernel of `variance`, taking every stride-th texel along `axis`.
 absl::Status BlurOnce(Gpu& gpu, const LightBuffer& from, const LightBuffer& to,
-                      const glm::uvec2& axis, uint32_t stride, double variance,
-                      const glm::vec3& density, bool colored) {
+                      const glm::uvec2& axis, uint32_t stride, const glm::dvec3& variance,
+                      const glm::vec3& density, const LightChannels& channels) {
   const absl::StatusOr<GLuint> program =
-      gpu.programs.Get(BlurProgram(), {{shader::kColoredLightBufferConstant, colored}});
+      gpu.programs.Get(BlurProgram(), {{shader::kColoredLightBufferConstant, channels.colored},
+                                       {shader::kUnscatteredLightConstant, channels.unscattered}});
   if (!program.ok()) return program.status();
-  const std::vector<float> weights = DiscreteGaussian(variance);
   shader::BlurBlock block{};
-  block.axis = {axis * stride, static_cast<uint32_t>(weights.size()) - 1, 0U};
-  block.density = glm::vec4(density, 0.0F);
-  for (size_t n = 0; n < weights.size(); ++n) {
-    block.weights[n / 4][static_cast<glm::length_t>(n % 4)] = weights[n];
+  size_t radius = 0;
+  for (glm::length_t c = 0; c < (channels.colored ? 3 : 1); ++c) {
+    const std::vector<float> weights = DiscreteGaussian(variance[c]);
+    for (size_t n = 0; n < weights.size(); ++n) block.weights[n][c] = weights[n];
+    radius = std::max(radius, weights.size() - 1);
   }
+  block.axis = {axis * stride, radius, 0U};
+  block.density = glm::vec4(density, 0.0F);
   const gl::Buffer uniforms = gl::MakeBlock("blur", block);
 
   glBindFramebuffer(GL_FRAMEBUFFER, to.framebuffer.name());
@@ -57,15 +63,16 @@ absl::Status BlurOnce(Gpu& gpu, const LightBuffer& from, const LightBuffer& to,
 // Blurs `buffer` along one axis. Kernels applied in turn add their variances; what earlier ones
 // have smoothed, later ones may take in strides, so that any width needs a handful of passes.
 absl::Status BlurAlongAxis(Gpu& gpu, LightBuffer& buffer, LightBuffer& scratch,
-                           const glm::uvec2& axis, double variance, const glm::vec3& density,
-                           bool colored) {
+                           const glm::uvec2& axis, const glm::dvec3& variance,
+                           const glm::vec3& density, const LightChannels& channels) {
   // Light spread further than the buffer is wide is the same everywhere.
-  double left = std::min(variance, std::pow(buffer.texture.width(), 2));
-  for (uint32_t stride = 1; left > 0.0; stride *= 4) {
+  glm::dvec3 left = glm::min(variance, glm::dvec3(std::pow(buffer.texture.width(), 2)));
+  for (uint32_t stride = 1; left.r > 0.0 || (channels.colored && (left.g > 0.0 || left.b > 0.0));
+       stride *= 4) {
     const double squared_stride = stride * stride;
-    const double now = std::min(left, kMaxBlurVariance * squared_stride);
+    const glm::dvec3 now = glm::min(left, glm::dvec3(kMaxBlurVariance * squared_stride));
     if (absl::Status status =
-            BlurOnce(gpu, buffer, scratch, axis, stride, now / squared_stride, density, colored);
+            BlurOnce(gpu, buffer, scratch, axis, stride, now / squared_stride, density, channels);
         !status.ok()) {
       return status;
     }
@@ -77,13 +84,13 @@ absl::Status BlurAlongAxis(Gpu& gpu, LightBuffer& buffer, LightBuffer& scratch,
 
 }  // namespace
 
-LightBuffer MakeLightBuffer(const char* label, int size, bool colored) {
+LightBuffer MakeLightBuffer(const char* label, int size, const LightChannels& channels) {
   LightBuffer buffer;
-  // Three channels live in four: drawing into RGB32F is not required of drivers.
-  buffer.texture = gl::Texture({.label = label,
-                                .format = static_cast<GLenum>(colored ? GL_RGBA32F : GL_R32F),
-                                .width = size,
-                                .height = size});
+  // Three channels live in four, the last of them for the unscattered light: drawing into RGB32F is
+  // not required of drivers.
+  GLenum format = channels.unscattered ? GL_RG32F : GL_R32F;
+  if (channels.colored) format = GL_RGBA32F;
+  buffer.texture = gl::Texture({.label = label, .format = format, .width = size, .height = size});
   buffer.framebuffer = gl::MakeFramebuffer(label, {&buffer.texture});
   constexpr std::array<float, 4> kZero = {};
   glClearNamedFramebufferfv(buffer.framebuffer.name(), GL_COLOR, 0, kZero.data());
@@ -91,13 +98,16 @@ LightBuffer MakeLightBuffer(const char* label, int size, bool colored) {
 }
 
 absl::Status DepositSlice(Gpu& gpu, const OrderBuffers& order, const gl::Buffer& light_splats,
-                          const TargetProjection& light, Profile profile, uint32_t begin,
-                          uint32_t end, const LightBuffer& target) {
+                          const TargetProjection& light, Profile profile,
+                          const LightChannels& channels, uint32_t begin, uint32_t end,
+                          const LightBuffer& target) {
   const gl::DebugScope scope("deposit slice into light buffer");
   const absl::StatusOr<GLuint> program = gpu.programs.Get(
       DepositProgram(), {
                             {shader::kOrthographicConstant, light.projection.orthographic},
                             {shader::kBallProfileConstant, profile == Profile::kBall},
+                            {shader::kColoredLightBufferConstant, channels.colored},
+                            {shader::kUnscatteredLightConstant, channels.unscattered},
                         });
   if (!program.ok()) return program.status();
   glBindFramebuffer(GL_FRAMEBUFFER, target.framebuffer.name());
@@ -118,11 +128,12 @@ void CopyLightBuffer(const LightBuffer& from, const LightBuffer& to) {
 }
 
 absl::Status BlurLightBuffer(Gpu& gpu, LightBuffer& buffer, LightBuffer& scratch,
-                             const glm::dvec2& variance, const glm::vec3& density, bool colored) {
+                             const BlurVariance& variance, const glm::vec3& density,
+                             const LightChannels& channels) {
   const gl::DebugScope scope("blur light buffer");
-  absl::Status status = BlurAlongAxis(gpu, buffer, scratch, {1, 0}, variance.x, density, colored);
+  absl::Status status = BlurAlongAxis(gpu, buffer, scratch, {1, 0}, variance.x, density, channels);
   if (!status.ok()) return status;
-  return BlurAlongAxis(gpu, buffer, scratch, {0, 1}, variance.y, density, colored);
+  return BlurAlongAxis(gpu, buffer, scratch, {0, 1}, variance.y, density, channels);
 }
 
 Image ReadLightBuffer(const LightBuffer& buffer, bool colored) {

@@ -17,20 +17,35 @@ struct LightBuffer {
   gl::Framebuffer framebuffer;
 };
 
-// Zeroed. `colored`: three channels (stored in four) instead of one.
-LightBuffer MakeLightBuffer(const char* label, int size, bool colored);
+// What the light buffers of a traversal hold.
+struct LightChannels {
+  bool colored = false;      // an optical depth for each colour instead of one for all
+  bool unscattered = false;  // beside it that of the light that has not been scattered
+};
+
+// Zeroed.
+LightBuffer MakeLightBuffer(const char* label, int size, const LightChannels& channels);
 
 // Adds particles [begin, end) of the order to `target`. `light` is the projection of the splats.
 absl::Status DepositSlice(Gpu& gpu, const OrderBuffers& order, const gl::Buffer& light_splats,
-                          const TargetProjection& light, Profile profile, uint32_t begin,
-                          uint32_t end, const LightBuffer& target);
+                          const TargetProjection& light, Profile profile,
+                          const LightChannels& channels, uint32_t begin, uint32_t end,
+                          const LightBuffer& target);
 
 void CopyLightBuffer(const LightBuffer& from, const LightBuffer& to);
 
-// Spreads the light in `buffer` sideways by these variances along x and y, in squared texels;
-// `density` is the light's shadow density. `scratch` is of the same size, its contents are lost.
+// How far light spreads sideways: variances along x and y of each colour, in squared texels.
+struct BlurVariance {
+  glm::dvec3 x;
+  glm::dvec3 y;
+};
+
+// Spreads the light in `buffer`, or where it holds the unscattered light, what is scattered.
+// `density` is the light's shadow density; red serves for a buffer that is not colored. `scratch`
+// is of the same size, its contents are lost.
 absl::Status BlurLightBuffer(Gpu& gpu, LightBuffer& buffer, LightBuffer& scratch,
-                             const glm::dvec2& variance, const glm::vec3& density, bool colored);
+                             const BlurVariance& variance, const glm::vec3& density,
+                             const LightChannels& channels);
 
 // The optical depth as it stands; one or three channels. Waits for the device.
 Image ReadLightBuffer(const LightBuffer& buffer, bool colored);

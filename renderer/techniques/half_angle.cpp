@@ -2,41 +2,81 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include <glm/geometric.hpp>
 
 #include "absl/strings/str_cat.h"
 #include "renderer/frame.h"
+#include "renderer/scattering.h"
 #include "renderer/traversal_context.h"
 
 namespace halflight {
 
 namespace {
 
-// World units by which light that crosses the whole cloud has spread sideways, thrice the standard
-// deviation; never so much that the cloud itself shrinks to nothing in the light buffer.
-double BorderForSpread(const TraversalContext& context) {
-  if (!context.traversal.blur || context.scene.shadow.blur_mode != BlurMode::kDistance) return 0.0;
-  const OffsetBounds& bounds = context.particles.bounds();
-  const double diameter = glm::distance(bounds.low, bounds.high);
-  return std::min(3.0 * context.scene.material.scattering_spread * std::sqrt(diameter),
-                  0.25 * diameter);
+// How light spreads along one light's traversal.
+class Spread {
+ public:
+  // Of a scene that scatters. `light_along_axis`: distance along the axis for one along the light.
+  Spread(const TraversalContext& context, const Light& light, double light_along_axis)
+      : shadow_(context.scene.shadow),
+        spread_(context.scene.material.scattering_spread),
+        light_along_axis_(light_along_axis) {
+    if (context.scene.material.physical_scattering) {
+      physical_.emplace(context.particles, light, *context.traversal.axis,
+                        *context.scene.material.physical_scattering,
+                        context.scene.material.profile);
+    }
+  }
+
+  // Squared world units by which light spreads between two positions along the axis.
+  [[nodiscard]] glm::dvec3 Variance(double from, double to) const {
+    if (physical_) return physical_->VarianceAt(to) - physical_->VarianceAt(from);
+    return glm::dvec3(spread_ * spread_ * (to - from) / light_along_axis_);
+  }
+
+  // The same in texels of the light buffer, between two slices that lie there.
+  [[nodiscard]] BlurVariance InTexels(double from, double to,
+                                      const glm::dvec2& texels_per_unit) const {
+    if (shadow_.blur_mode == BlurMode::kTexelsPerSlice) {
+      const double texels = shadow_.blur_texels;
+      return {glm::dvec3(texels * texels), glm::dvec3(texels * texels)};
+    }
+    const glm::dvec3 variance = Variance(from, to);
+    return {variance * texels_per_unit.x * texels_per_unit.x,
+            variance * texels_per_unit.y * texels_per_unit.y};
+  }
+
+  // World units by which light that crosses the whole cloud has spread sideways, thrice the
+  // standard deviation; never so much that the cloud itself shrinks to nothing in the light buffer.
+  [[nodiscard]] double Border(const OffsetBounds& bounds) const {
+    if (shadow_.blur_mode == BlurMode::kTexelsPerSlice) return 0.0;
+    const double diameter = glm::distance(bounds.low, bounds.high);
+    const glm::dvec3 variance = physical_
+                                    ? physical_->VarianceAt(std::numeric_limits<double>::infinity())
+                                    : glm::dvec3(spread_ * spread_ * diameter);
+    return std::min(3.0 * std::sqrt(std::max({variance.r, variance.g, variance.b})),
+                    0.25 * diameter);
+  }
+
+ private:
+  const ShadowSettings& shadow_;
+  double spread_;
+  double light_along_axis_;
+  std::optional<PhysicalSpread> physical_;
+};
+
+// Texels of the light buffer for one world unit at the middle of the particles.
+glm::dvec2 TexelsPerUnit(const Projection& light, const ParticleView& particles) {
+  const glm::dvec2 texels_per_unit = glm::abs(light.pixel_from_plane);
+  if (light.orthographic) return texels_per_unit;
+  return texels_per_unit /
+         glm::distance(particles.set().origin + particles.bounds().center(), light.eye());
 }
 
-// Squared texels along x and y by which light spreads between the middles of two slices that lie
-// `distance` (world units along the light) apart.
-glm::dvec2 BlurVariance(const TraversalContext& context, const Projection& light, double distance) {
-  if (context.scene.shadow.blur_mode == BlurMode::kTexelsPerSlice) {
-    const double texels = context.scene.shadow.blur_texels;
-    return glm::dvec2(texels * texels);
-  }
-  const double spread = context.scene.material.scattering_spread;
-  glm::dvec2 texels_per_unit = glm::abs(light.pixel_from_plane);
-  if (!light.orthographic) {
-    const glm::dvec3 center = context.particles.set().origin + context.particles.bounds().center();
-    texels_per_unit /= glm::distance(center, light.eye());
-  }
-  return spread * spread * distance * texels_per_unit * texels_per_unit;
+LightChannels ChannelsOf(const Traversal& traversal) {
+  return {.colored = traversal.colored_light_buffer, .unscattered = traversal.keep_unscattered};
 }
 
 // The light buffers of a traversal. `before` holds what the slices so far left; `after` also the
@@ -48,10 +88,10 @@ struct LightBuffers {
 
   explicit LightBuffers(const Traversal& traversal) {
     const int size = traversal.light_buffer_size;
-    const bool colored = traversal.colored_light_buffer;
-    before = MakeLightBuffer("light buffer", size, colored);
-    if (traversal.interpolate) after = MakeLightBuffer("light buffer, next", size, colored);
-    if (traversal.blur) scratch = MakeLightBuffer("light buffer, blur", size, colored);
+    const LightChannels channels = ChannelsOf(traversal);
+    before = MakeLightBuffer("light buffer", size, channels);
+    if (traversal.interpolate) after = MakeLightBuffer("light buffer, next", size, channels);
+    if (traversal.blur) scratch = MakeLightBuffer("light buffer, blur", size, channels);
   }
 };
 
@@ -92,6 +132,7 @@ absl::StatusOr<Traversal> HalfAngle::PlanLight(const Scene& scene, const Particl
   traversal.spacing = scene.shadow.spacing;
   traversal.light_buffer_size = scene.shadow.light_buffer_size;
   traversal.blur = scene.scatters();
+  traversal.keep_unscattered = traversal.blur && scene.material.physical_scattering;
   traversal.colored_light_buffer = traversal.blur && source.colored_density();
   return traversal;
 }
@@ -127,10 +168,17 @@ absl::StatusOr<ShadowResult> HalfAngle::Draw(const TraversalContext& context,
   const ParticleOrder order = OrderParticles(
       context.particles, traversal, context.eye.projection.eye() - context.particles.set().origin);
   context.clock.BeginCpu("light camera");
-  const Projection light_projection = LightProjection(
-      source, context.particles, traversal.light_buffer_size, BorderForSpread(context));
-  const double light_along_axis =
-      glm::dot(TravelDirection(source, context.particles), *traversal.axis);
+  std::optional<Spread> spread;
+  if (traversal.blur) {
+    spread.emplace(context, source,
+                   glm::dot(TravelDirection(source, context.particles), *traversal.axis));
+  }
+  Projection light_projection =
+      LightProjection(source, context.particles, traversal.light_buffer_size,
+                      spread ? spread->Border(context.particles.bounds()) : 0.0);
+  if (const auto& physical = context.scene.material.physical_scattering) {
+    light_projection.optical_depth_scale = ForwardExtinction(*physical);
+  }
   report.casts_shadows = true;
   report.light_texture_from_world = light_projection.texture_from_world();
   report.light_view_from_world = light_projection.view_from_world;
@@ -155,11 +203,11 @@ absl::StatusOr<ShadowResult> HalfAngle::Draw(const TraversalContext& context,
   const CompositePass composite =
       PrepareComposite(context.scene, traversal, order_buffers, context.buffers, context.eye,
                        *eye_splats, &light, &*light_splats, context.target);
-  const auto spread = [&](double distance_along_axis) {
-    return BlurLightBuffer(
-        gpu, buffers.before, buffers.scratch,
-        BlurVariance(context, light_projection, distance_along_axis / light_along_axis),
-        source.shadow_density, traversal.colored_light_buffer);
+  const glm::dvec2 texels_per_unit = TexelsPerUnit(light_projection, context.particles);
+  const auto blur = [&](double from, double to) {
+    return BlurLightBuffer(gpu, buffers.before, buffers.scratch,
+                           spread->InTexels(from, to, texels_per_unit), source.shadow_density,
+                           ChannelsOf(traversal));
   };
   ShadowResult result;
   for (size_t s = 0; s + 1 < order.slice_begin.size(); ++s) {
@@ -167,13 +215,15 @@ absl::StatusOr<ShadowResult> HalfAngle::Draw(const TraversalContext& context,
     const uint32_t begin = order.slice_begin[s];
     const uint32_t end = order.slice_begin[s + 1];
     if (traversal.blur && s > 0) {
-      const double distance = order.slice_position[s] - order.slice_position[s - 1];
-      if (absl::Status status = spread(distance); !status.ok()) return status;
+      if (absl::Status status = blur(order.slice_position[s - 1], order.slice_position[s]);
+          !status.ok()) {
+        return status;
+      }
     }
     LightBuffer& deposit_into = traversal.interpolate ? buffers.after : buffers.before;
     const auto deposit = [&] {
       return DepositSlice(gpu, order_buffers, *light_splats, light, context.scene.material.profile,
-                          begin, end, deposit_into);
+                          ChannelsOf(traversal), begin, end, deposit_into);
     };
     const auto draw = [&] {
       const SliceLight slice_light{buffers.before, deposit_into};
@@ -199,8 +249,10 @@ absl::StatusOr<ShadowResult> HalfAngle::Draw(const TraversalContext& context,
   if (traversal.keep_light_buffer) {
     // The buffer stands at the middle of the last slice; shown is the light behind all particles.
     if (traversal.blur) {
-      const double distance = order.end_position - order.slice_position.back();
-      if (absl::Status status = spread(distance); !status.ok()) return status;
+      if (absl::Status status = blur(order.slice_position.back(), order.end_position);
+          !status.ok()) {
+        return status;
+      }
     }
     result.light_buffer = ReadLightBuffer(buffers.before, traversal.colored_light_buffer);
   }

@@ -63,6 +63,24 @@ Light ConvertLight(const v1::Light& light, const std::string& path, FieldChecks&
   return converted;
 }
 
+PhysicalScattering ConvertScattering(const v1::Material& material, const std::string& path,
+                                     FieldChecks& checks) {
+  const v1::PhysicalScattering& scattering = material.physical_scattering();
+  PhysicalScattering converted;
+  converted.mean_cosine = checks.InRange(path + ".mean_cosine", scattering.mean_cosine(),
+                                         {.low = 0.0, .high = 1.0, .open_high = true});
+  if (scattering.has_albedo()) {
+    converted.albedo =
+        checks.InRange(path + ".albedo", scattering.albedo(), {.low = 0.0, .high = 1.0});
+  }
+  if (material.scattering_spread() != 0.0F) {
+    checks.Reject(path,
+                  fmt::format("set beside a scattering_spread of {}", material.scattering_spread()),
+                  "one of physical_scattering and scattering_spread");
+  }
+  return converted;
+}
+
 Material ConvertMaterial(const v1::Material& material, const ParticleSet& particles,
                          FieldChecks& checks) {
   const std::string path = "scene.material";
@@ -95,6 +113,10 @@ Material ConvertMaterial(const v1::Material& material, const ParticleSet& partic
                      {.low = -1.0, .high = 1.0, .open_low = true, .open_high = true});
   converted.scattering_spread =
       checks.InRange(path + ".scattering_spread", material.scattering_spread(), kNotNegative);
+  if (material.has_physical_scattering()) {
+    converted.physical_scattering =
+        ConvertScattering(material, path + ".physical_scattering", checks);
+  }
   return converted;
 }
 
@@ -205,6 +227,11 @@ Scene ConvertScene(const v1::Scene& scene, std::shared_ptr<const ParticleSet> pa
       converted.particles->size() > 0) {
     checks.Reject("scene.time_offset_s", fmt::format("{}", converted.time_offset_s),
                   "0 or unset where the particle set has no VELOCITY");
+  }
+  if (converted.material.physical_scattering &&
+      converted.shadow.blur_mode == BlurMode::kTexelsPerSlice) {
+    checks.Reject("scene.material.physical_scattering",
+                  "set with a blur_mode of BLUR_MODE_TEXELS_PER_SLICE", "BLUR_MODE_DISTANCE");
   }
   if (converted.time_offset_s != 0.0) {
     CheckMoved(*converted.particles, converted.time_offset_s, checks);

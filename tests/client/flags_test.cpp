@@ -209,6 +209,14 @@ TEST(RenderFlags, OverrideTheSceneFileFieldByField) {
                               "compression": 4}]})");
 }
 
+TEST(RenderFlags, ScatterByAMediumInPlaceOfASpread) {
+  ExpectJson(RequestOf({"--scattering-g", "0.75", "--scattering-albedo", "0.5"}),
+             R"({"scene": {"camera": {}, "material": {"physical_scattering":
+                   {"mean_cosine": 0.75, "albedo": 0.5}}}})");
+  ExpectJson(RequestOf({"--scattering-albedo", "1"}),
+             R"({"scene": {"camera": {}, "material": {"physical_scattering": {"albedo": 1}}}})");
+}
+
 TEST(RenderFlags, TakeOneValueEachSoThatTheInputMayComeLast) {
   RenderOptions options;
   EXPECT_EQ(Parse({"-o", "a.png", "--light", "camera", "--density", "2", "in.ply"}, options), "");
@@ -241,6 +249,9 @@ TEST(RenderFlags, NameTheFlagTheValueAndWhatIsAllowed) {
            // Infinite as the 32-bit floats that they become.
            Case{{"--density", "1e39"}, {"--density", "'1e39'", "3e38"}},
            Case{{"--scattering", "1e39"}, {"--scattering", "'1e39'", "3e38"}},
+           Case{{"--scattering-g", "1"}, {"--scattering-g", "'1'", "< 1"}},
+           Case{{"--scattering-albedo", "1.5"}, {"--scattering-albedo", "'1.5'", "0 to 1"}},
+           Case{{"--scattering", "0.1", "--scattering-g", "0.5"}, {"--scattering"}},
            Case{{"--radius", "1e39"}, {"--radius", "'1e39'"}},
            Case{{"--phase-g", "1"}, {"--phase-g", "'1'", "< 1"}},
            Case{{"--slices", "0"}, {"--slices", "'0'", "from 1"}},

@@ -58,6 +58,7 @@ TEST(SamePixels, TheRendererAloneMakesTheSameFloats) {
   scene.lights.push_back({.kind = PointLight{{3, 2, 1}, true}, .color = glm::vec3(4, 3, 2)});
   scene.lights.back().shadow_density = {1.0F, 0.5F, 0.25F};
   scene.material.phase_g = 0.25F;
+  scene.material.physical_scattering = PhysicalScattering{0.75F, 0.5F};
   const client::RenderedFrame frame = MustRender(client, RequestOf(scene));
 
   auto renderer = FrameRenderer::Create("auto");

@@ -77,6 +77,10 @@ void Set(const Material& from, v1::Material& to) {
   Set(from.ambient, *to.mutable_ambient());
   to.set_phase_g(from.phase_g);
   to.set_scattering_spread(from.scattering_spread);
+  if (from.physical_scattering) {
+    to.mutable_physical_scattering()->set_mean_cosine(from.physical_scattering->mean_cosine);
+    to.mutable_physical_scattering()->set_albedo(from.physical_scattering->albedo);
+  }
 }
 
 }  // namespace

@@ -56,6 +56,20 @@ TEST(PlanFrame, BlursOnlyWhereLightScatters) {
   EXPECT_THAT(Plan(request).passes, Contains(PassNamed("blur")));
 }
 
+TEST(PlanFrame, KeepsUnscatteredLightOnlyWhereAPhysicalMediumScatters) {
+  FrameRequest request = test::Beauty(test::BallScene(100));
+  request.scene.material.scattering_spread = 0.1F;
+  EXPECT_FALSE(Plan(request).traversals[0].keep_unscattered);
+  request.scene.material.scattering_spread = 0.0F;
+  request.scene.material.physical_scattering = PhysicalScattering{0.8F, 0.9F};
+  EXPECT_TRUE(Plan(request).traversals[0].keep_unscattered);
+  EXPECT_THAT(Plan(request).passes, Contains(PassNamed("blur")));
+  // A medium that only absorbs.
+  request.scene.material.physical_scattering->albedo = 0.0F;
+  EXPECT_FALSE(Plan(request).traversals[0].keep_unscattered);
+  EXPECT_THAT(Plan(request).passes, Not(Contains(PassNamed("blur"))));
+}
+
 TEST(PlanFrame, ColoursTheLightBufferOnlyWhereBlurTreatsColoursDifferently) {
   FrameRequest request = test::Beauty(test::BallScene(100));
   request.scene.lights[0].shadow_density = {1.0F, 2.0F, 3.0F};

@@ -101,6 +101,10 @@ TEST_F(ReferenceFrame, RefusesByNameWhatTheModelHasNot) {
       {[](FrameRequest& r) { r.scene.material.scattering_spread = 0.5F; },
        "material.scattering_spread: 0.5, "},
       {[](FrameRequest& r) {
+         r.scene.material.physical_scattering = {0.5F, 0.75F};
+       },
+       "material.physical_scattering.albedo: 0.75, "},
+      {[](FrameRequest& r) {
          r.scene.shadow.blur_mode = BlurMode::kTexelsPerSlice;
          r.scene.shadow.blur_texels = 2.0F;
        },

@@ -121,6 +121,17 @@ TEST_F(Measurement, OfScatteringIsOfASecondFrameWithout) {
   EXPECT_EQ(header.plan().passes_size(), 1);
 }
 
+TEST_F(Measurement, OfPhysicalScatteringIsOfASecondFrameWithout) {
+  StartNoting();
+  v1::RenderFrameRequest request = MeasuredRequest();
+  request.mutable_scene()->mutable_material()->mutable_physical_scattering()->set_mean_cosine(0.8F);
+  const Result result = Submit(MustConvert(request)).get();
+  ASSERT_TRUE(result.ok()) << result.status();
+  EXPECT_EQ(engine_.rendered(), 2);
+  EXPECT_FALSE(engine_.last_request().scene.scatters());
+  EXPECT_EQ((*result)->header.error().compared(), v1::COMPARED_FRAME_WITHOUT_SCATTERING);
+}
+
 TEST_F(Measurement, OutputOfTheErrorHoldsFrameMinusModel) {
   StartNoting();
   v1::RenderFrameRequest request = MakeRequest();

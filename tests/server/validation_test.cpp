@@ -241,6 +241,31 @@ INSTANTIATE_TEST_SUITE_P(
                 "scene.material.phase_g: 1, allowed: (-1, 1)"},
         Refusal{"SpreadNegative", [](Request& r) { MaterialOf(r).set_scattering_spread(-1.0F); },
                 "scene.material.scattering_spread: -1"},
+        Refusal{
+            "MeanCosineAtTheEnd",
+            [](Request& r) { MaterialOf(r).mutable_physical_scattering()->set_mean_cosine(1.0F); },
+            "scene.material.physical_scattering.mean_cosine: 1, allowed: [0, 1)"},
+        Refusal{
+            "MeanCosineBackward",
+            [](Request& r) { MaterialOf(r).mutable_physical_scattering()->set_mean_cosine(-0.5F); },
+            "scene.material.physical_scattering.mean_cosine: -0.5, allowed: [0, 1)"},
+        Refusal{"ScatteringAlbedoAboveOne",
+                [](Request& r) { MaterialOf(r).mutable_physical_scattering()->set_albedo(1.5F); },
+                "scene.material.physical_scattering.albedo: 1.5, allowed: [0, 1]"},
+        Refusal{"BothKindsOfScattering",
+                [](Request& r) {
+                  MaterialOf(r).set_scattering_spread(0.25F);
+                  MaterialOf(r).mutable_physical_scattering()->set_mean_cosine(0.5F);
+                },
+                "scene.material.physical_scattering: set beside a scattering_spread of 0.25"},
+        Refusal{"PhysicalScatteringByTexels",
+                [](Request& r) {
+                  MaterialOf(r).mutable_physical_scattering()->set_mean_cosine(0.5F);
+                  ShadowOf(r).set_blur_mode(v1::BLUR_MODE_TEXELS_PER_SLICE);
+                  ShadowOf(r).set_blur_texels(2.0F);
+                },
+                "scene.material.physical_scattering: set with a blur_mode of "
+                "BLUR_MODE_TEXELS_PER_SLICE"},
         Refusal{"TimeWithoutVelocity",
                 [](Request& r) { r.mutable_scene()->set_time_offset_s(0.5); },
                 "scene.time_offset_s: 0.5"},
