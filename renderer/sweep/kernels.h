@@ -69,8 +69,8 @@ struct Rgb {
   float blue = 0.0F;
 };
 
-// A particle that reaches the plane through the eye and has no scaled coordinates, in radii; view
-// axes.
+// The centre of a particle near the eye, in radii, view axes: it may have no scaled coordinates, or
+// fills so wide an angle that they are no linear function of its offsets.
 struct NearSprite {
   float center[3] = {};
 };
@@ -91,8 +91,9 @@ struct ShadedSprites {
   // of the centre, the radius, nothing. Null: not wanted.
   const float* depth = nullptr;
   int lights = 0;
-  int exponents = 1;            // a light: one, or three for coloured density
-  bool clamp_exponents = true;  // none is below 0
+  int exponents = 1;  // a light: one, or three for coloured density
+  // By light: whether its exponent is a shadow's alone, and not below 0.
+  const bool* shadow_alone = nullptr;
   int degree = 0;
   const Rgb* lit = nullptr;          // a sprite and light
   const float* exponent = nullptr;   // a sprite, light and exponent: Terms(degree) coefficients

@@ -120,7 +120,7 @@ HALFLIGHT_INLINE void CompositeRow(const ShadedSprites& shaded, uint32_t i, cons
   const Floats seen = alpha - alpha * chunk.coverage;
   const auto exp_of = [&](int light, int channel) {
     const Floats x = exponent(light, channel);
-    return ExpOfMinus(shaded.clamp_exponents ? Max(x, Floats{}) : x);
+    return ExpOfMinus(shaded.shadow_alone[light] ? Max(x, Floats{}) : x);
   };
   for (int light = 0; light < shaded.lights; ++light) {
     const Floats t = exp_of(light, 0);
@@ -205,7 +205,7 @@ HALFLIGHT_INLINE void CompositeSprite(const ImageTileJob& job, uint32_t i, const
   }
 }
 
-// A sprite that reaches the plane through the eye: the general encounter of shaders/splat.glsl.
+// A sprite near the eye: the general encounter of shaders/splat.glsl.
 template <bool kColored, int kDegree>
 [[gnu::noinline]] void CompositeNearSprite(const ImageTileJob& job, uint32_t i,
                                            const TileRays& rays, const Extras& extras,

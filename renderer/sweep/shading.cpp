@@ -152,7 +152,7 @@ ShadedSprites Shading::View(const SpriteList& list) const {
   view.depth = depth.empty() ? nullptr : depth.data();
   view.lights = static_cast<int>(lights.size());
   view.exponents = exponents;
-  view.clamp_exponents = clamp_exponents;
+  view.shadow_alone = shadow_alone.data();
   view.degree = degree;
   view.lit = lit.data();
   view.exponent = exponent.data();
@@ -167,6 +167,14 @@ int Shading::SlotOf(int light) const {
     if (lights[i].light == light) slot = static_cast<int>(i);  // the last: without variation
   }
   return slot;
+}
+
+double NearDepth(const Scene& scene) {
+  constexpr double kWide = 8.0;
+  const bool varies =
+      std::any_of(scene.lights.begin(), scene.lights.end(),
+                  [&](const Light& light) { return Varies(light, scene.material); });
+  return varies ? 0.0 : kWide;
 }
 
 Shading ShadeSprites(const Scene& scene, const ParticleView& particles, const Projection& eye,
@@ -184,7 +192,7 @@ Shading ShadeSprites(const Scene& scene, const ParticleView& particles, const Pr
   for (const TileLight& light : shading.lights) {
     const Light& source = scene.lights[static_cast<size_t>(light.light)];
     shading.exponents = source.colored_density() && light.fit != nullptr ? 3 : shading.exponents;
-    shading.clamp_exponents &= !light.varies;
+    shading.shadow_alone[factors.size()] = !light.varies;
     factors.emplace_back(source, material, eye.view_from_world);
     rotations.push_back(light.fit == nullptr ? glm::dmat3(1.0)
                                              : glm::dmat3(light.fit->projection.view_from_world) *

@@ -1,6 +1,7 @@
 // What the lights make of every particle, as the compositor's kernels want it.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -26,7 +27,7 @@ struct Shading {
   std::vector<TileLight> lights;
   int degree = 0;
   int exponents = 1;
-  bool clamp_exponents = true;
+  std::array<bool, kMaxTileLights> shadow_alone = {};
   std::vector<uint16_t> rows;
   std::vector<Rgb> unshadowed;
   std::vector<float> depth;
@@ -38,6 +39,11 @@ struct Shading {
   // Where the transmittance of a light of the scene is among `lights`.
   [[nodiscard]] int SlotOf(int light) const;
 };
+
+// Depth in radii within which a particle fills so wide an angle that its shadow is not taken as
+// linear in the image: the error of that is below the fit's from here on. Lights whose radiance
+// varies over a sprite are better off with the linear form, which knows of it.
+double NearDepth(const Scene& scene);
 
 // `fits` has one for each light of the scene, null for those that cast no shadows. `keep_depth` and
 // `keep_transmittance`: an output shows them.

@@ -1,6 +1,7 @@
 #include "renderer/sweep/sprites.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <numbers>
 
@@ -13,6 +14,9 @@
 namespace halflight::sweep {
 
 namespace {
+
+// Radii from the plane through the eye within which a particle may reach it, as rounding goes.
+constexpr double kLeastNearDepth = 1.0005;
 
 // Slopes of the tangents from the origin to a circle around (x, w), w > r.
 glm::dvec2 TangentSlopes(double x, double w, double r) {
@@ -49,7 +53,8 @@ Rect RectOf(const Projection& target, const glm::dvec2& xs, const glm::dvec2& ys
 
 }  // namespace
 
-SpriteList ListSprites(const ParticleView& particles, const Projection& target) {
+SpriteList ListSprites(const ParticleView& particles, const Projection& target, double near_depth) {
+  near_depth = std::max(near_depth, kLeastNearDepth);
   const size_t count = particles.size();
   const glm::dmat3 rotation(target.view_from_world);
   const glm::dvec3 origin_from_eye = particles.set().origin - target.eye();
@@ -59,9 +64,11 @@ SpriteList ListSprites(const ParticleView& particles, const Projection& target) 
 
   // Sort by depth.
   std::vector<uint32_t> keys(count);
+  std::atomic<bool> has_near = false;
   ParallelRanges(count, [&](const WorkRange& range) {
     for (size_t i = range.begin; i < range.end; ++i) {
       const glm::dvec3 view = view_of(i);
+      if (-view.z <= near_depth * particles.radius(i)) has_near = true;
       keys[i] =
           OrderedKey(static_cast<float>(target.orthographic ? -view.z : glm::dot(view, view)));
     }
@@ -72,7 +79,7 @@ SpriteList ListSprites(const ParticleView& particles, const Projection& target) 
   // Project.
   list.sprites.resize(count);
   list.rects.resize(count);
-  if (ReachesEyePlane(target, particles)) list.near.resize(count);
+  if (has_near && !target.orthographic) list.near.resize(count);
   ParallelRanges(count, [&](const WorkRange& range) {
     for (size_t place = range.begin; place < range.end; ++place) {
       const uint32_t i = list.particles[place];
@@ -92,7 +99,7 @@ SpriteList ListSprites(const ParticleView& particles, const Projection& target) 
                                static_cast<float>(1.0 / radius), static_cast<float>(optical_depth)};
         list.rects[place] = RectOf(target, view.x + glm::dvec2(-radius, radius),
                                    view.y + glm::dvec2(-radius, radius));
-      } else if (w > 1.0005 * radius) {
+      } else if (w > near_depth * radius) {
         list.sprites[place] = {static_cast<float>(view.x / w), static_cast<float>(view.y / w),
                                static_cast<float>(w / radius), static_cast<float>(optical_depth)};
         list.rects[place] =
@@ -103,7 +110,10 @@ SpriteList ListSprites(const ParticleView& particles, const Projection& target) 
                              static_cast<float>(view.y / radius),
                              static_cast<float>(view.z / radius)}};
         list.rects[place] =
-            RectOf(target, VisibleSlopes(view.x, w, radius), VisibleSlopes(view.y, w, radius));
+            w > kLeastNearDepth * radius
+                ? RectOf(target, TangentSlopes(view.x, w, radius), TangentSlopes(view.y, w, radius))
+                : RectOf(target, VisibleSlopes(view.x, w, radius),
+                         VisibleSlopes(view.y, w, radius));
       }
     }
   });

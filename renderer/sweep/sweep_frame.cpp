@@ -29,6 +29,11 @@ absl::Status CheckRequest(const FrameRequest& request) {
     return Refuse("material.scattering_spread", absl::StrCat(scene.material.scattering_spread),
                   "0, since it has no slices to blur between");
   }
+  if (scene.material.scatters_physically()) {
+    return Refuse("material.physical_scattering.albedo",
+                  absl::StrCat(scene.material.physical_scattering->albedo),
+                  "0, since it has no slices to blur between");
+  }
   for (const ImageRequest& image : request.images) {
     if (image.kind == ImageKind::kLightLayers) {
       return Refuse("outputs", "light layers",
@@ -47,12 +52,18 @@ bool Shows(const FrameRequest& request, ImageKind kind) {
 
 }  // namespace
 
-absl::Status PlanSweepFrame(const FrameRequest& request, const ParticleView& /*particles*/,
+absl::Status PlanSweepFrame(const FrameRequest& request, const ParticleView& particles,
                             FramePlan& plan) {
   if (absl::Status status = CheckRequest(request); !status.ok()) return status;
   const std::vector<Light>& lights = request.scene.lights;
   for (size_t l = 0; l < lights.size(); ++l) {
     if (!lights[l].casts_shadows()) continue;
+    if (LiesAmong(lights[l], particles)) {
+      const glm::dvec3& at = std::get<PointLight>(lights[l].kind).position;
+      return Refuse(absl::StrCat("lighting.lights[", l, "].point.position"),
+                    absl::StrCat("(", at.x, ", ", at.y, ", ", at.z, ")"),
+                    "outside the particles, for a light that casts shadows");
+    }
     const std::string light = absl::StrCat("light ", l, " casts shadows");
     plan.passes.push_back({"sort along the light", light, 1});
     plan.passes.push_back({"sweep the light buffer through the particles", light, 1});
@@ -96,7 +107,7 @@ absl::StatusOr<DrawnImages> DrawSweepFrame(const FrameRequest& request,
   const double samples = static_cast<double>(scene.sampling.supersample) /
                          static_cast<double>(scene.sampling.downsample);
   const Projection eye = EyeProjection(scene.camera, plan.composite_size, samples);
-  const sweep::SpriteList list = sweep::ListSprites(particles, eye);
+  const sweep::SpriteList list = sweep::ListSprites(particles, eye, sweep::NearDepth(scene));
   clock.BeginCpu("shade");
   const bool keep_transmittance = Shows(request, ImageKind::kLightTransmittance);
   const sweep::Shading shading =

@@ -107,8 +107,9 @@ TEST_P(EitherKernels, SweepDepositsInOrder) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Kernels, EitherKernels, testing::Bool(),
-                         [](const auto& instance) { return instance.param ? "OfThisCpu" : "OfAnyCpu"; });
+INSTANTIATE_TEST_SUITE_P(Kernels, EitherKernels, testing::Bool(), [](const auto& instance) {
+  return instance.param ? "OfThisCpu" : "OfAnyCpu";
+});
 
 }  // namespace
 }  // namespace halflight::sweep
