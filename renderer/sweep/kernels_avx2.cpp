@@ -7,4 +7,4 @@
 #include "renderer/sweep/simd.h"
 
 #define HALFLIGHT_KERNEL_SET avx2
-#include "renderer/sweep/kernels_impl.h"
+#include "renderer/sweep/kernels.inc"

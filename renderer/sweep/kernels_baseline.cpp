@@ -6,7 +6,7 @@
 #include "renderer/sweep/simd.h"
 
 #define HALFLIGHT_KERNEL_SET baseline
-#include "renderer/sweep/kernels_impl.h"
+#include "renderer/sweep/kernels.inc"
 
 #if defined(__x86_64__)
 namespace halflight::sweep::avx2 {
