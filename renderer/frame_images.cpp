@@ -83,4 +83,24 @@ Image LightImage(const Image& optical_depth, LightQuantity quantity, const Light
                    });
 }
 
+Image SelectImage(const ImageRequest& request, const Scene& scene, const DrawnImages& drawn) {
+  const auto light = static_cast<size_t>(request.light_index);
+  switch (request.kind) {
+    case ImageKind::kBeauty:
+    case ImageKind::kError:  // refused by PlanFrame
+      break;
+    case ImageKind::kCoverage:
+      return CoverageOf(drawn.beauty);
+    case ImageKind::kDepth:
+      return DepthOf(drawn.depth);
+    case ImageKind::kLightTransmittance:
+      return TransmittanceOf(drawn.transmittance[light], scene.lights[light].colored_density());
+    case ImageKind::kLightBuffer:
+      return LightImage(drawn.shadows[light].light_buffer, request.quantity, scene.lights[light]);
+    case ImageKind::kLightLayers:
+      return LightImage(drawn.shadows[light].light_layers, request.quantity, scene.lights[light]);
+  }
+  return drawn.beauty;
+}
+
 }  // namespace halflight

@@ -1,11 +1,25 @@
 // Turns what was drawn into the images that were asked for. Reads targets back; draws nothing.
 #pragma once
 
+#include <vector>
+
 #include "renderer/gl/object.h"
 #include "renderer/image.h"
 #include "renderer/scene.h"
+#include "renderer/shadow_technique.h"
 
 namespace halflight {
+
+// What a technique leaves behind, by kind of image.
+struct DrawnImages {
+  Image beauty;                       // R G B A
+  Image depth;                        // depth * alpha, alpha in A
+  std::vector<Image> transmittance;   // by light: R G B * alpha, alpha
+  std::vector<ShadowResult> shadows;  // by light
+};
+
+// The image that an output shows.
+Image SelectImage(const ImageRequest& request, const Scene& scene, const DrawnImages& drawn);
 
 // All four channels of a texture. Waits for the device.
 Image ReadTexture(const gl::Texture& texture);

@@ -7,6 +7,7 @@
 #include "renderer/projection.h"
 #include "renderer/reference_frame.h"
 #include "renderer/shadow_technique.h"
+#include "renderer/sweep/sweep_frame.h"
 
 namespace halflight {
 
@@ -41,10 +42,13 @@ void DescribePasses(const Scene& scene, FramePlan& plan) {
       plan.passes.push_back({"composite", "the image", 1});
     }
   }
-  if (scene.sampling.supersample > 1) {
+}
+
+void DescribeSampling(const Sampling& sampling, FramePlan& plan) {
+  if (sampling.supersample > 1) {
     plan.passes.push_back({"average samples", "supersample above 1", 1});
   }
-  if (scene.sampling.downsample > 1) {
+  if (sampling.downsample > 1) {
     plan.passes.push_back({"enlarge samples", "downsample above 1", 1});
   }
 }
@@ -69,6 +73,11 @@ absl::StatusOr<FramePlan> PlanFrame(const FrameRequest& request, const ParticleV
   plan.composite_size = CompositeSize(scene.camera.window, scene.sampling);
   for (const ImageRequest& image : request.images) {
     plan.keep_depth |= image.kind == ImageKind::kDepth;
+  }
+  if (scene.shadow.technique == ShadowTechniqueKind::kLightSweep) {
+    if (absl::Status status = PlanSweepFrame(request, particles, plan); !status.ok()) return status;
+    DescribeSampling(scene.sampling, plan);
+    return plan;
   }
 
   // One traversal for each light that casts shadows: each has an axis of its own.
@@ -97,6 +106,7 @@ absl::StatusOr<FramePlan> PlanFrame(const FrameRequest& request, const ParticleV
   plan.traversals.front().unshadowed_lights = std::move(unshadowed);
 
   DescribePasses(scene, plan);
+  DescribeSampling(scene.sampling, plan);
   return plan;
 }
 

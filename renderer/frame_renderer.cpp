@@ -10,19 +10,12 @@
 #include "renderer/passes/resolve.h"
 #include "renderer/reference_frame.h"
 #include "renderer/shadow_technique.h"
+#include "renderer/sweep/sweep_frame.h"
 #include "renderer/traversal_context.h"
 
 namespace halflight {
 
 namespace {
-
-// What the traversals leave behind, by kind of image.
-struct DrawnImages {
-  Image beauty;                       // R G B A
-  Image depth;                        // depth * alpha, alpha in A
-  std::vector<Image> transmittance;   // by light: R G B * alpha, alpha
-  std::vector<ShadowResult> shadows;  // by light
-};
 
 absl::Status CheckTargetSize(const FramePlan& plan, const DeviceInfo& device) {
   for (const int side : {plan.composite_size.x, plan.composite_size.y}) {
@@ -106,24 +99,20 @@ absl::Status DrawTraversal(const TraversalContext& context, const FramePlan& pla
   return absl::OkStatus();
 }
 
-Image SelectImage(const ImageRequest& request, const Scene& scene, const DrawnImages& drawn) {
-  const auto light = static_cast<size_t>(request.light_index);
-  switch (request.kind) {
-    case ImageKind::kBeauty:
-    case ImageKind::kError:  // refused by PlanFrame
-      break;
-    case ImageKind::kCoverage:
-      return CoverageOf(drawn.beauty);
-    case ImageKind::kDepth:
-      return DepthOf(drawn.depth);
-    case ImageKind::kLightTransmittance:
-      return TransmittanceOf(drawn.transmittance[light], scene.lights[light].colored_density());
-    case ImageKind::kLightBuffer:
-      return LightImage(drawn.shadows[light].light_buffer, request.quantity, scene.lights[light]);
-    case ImageKind::kLightLayers:
-      return LightImage(drawn.shadows[light].light_layers, request.quantity, scene.lights[light]);
+// Makes the images that were asked for.
+FrameResult FinishFrame(const FrameRequest& request, const DrawnImages& drawn, FramePlan plan,
+                        std::vector<LightReport> reports, const ParticleView& particles,
+                        StageClock& clock) {
+  clock.BeginCpu("images");
+  FrameResult result;
+  for (const ImageRequest& image : request.images) {
+    result.images.push_back(SelectImage(image, request.scene, drawn));
   }
-  return drawn.beauty;
+  result.plan = std::move(plan);
+  result.lights = std::move(reports);
+  result.clamped_opacities = particles.clamped_opacities();
+  result.timings = clock.Finish();
+  return result;
 }
 
 }  // namespace
@@ -152,6 +141,13 @@ absl::StatusOr<FrameResult> FrameRenderer::Render(const FrameRequest& request,
     result->clamped_opacities = particles.clamped_opacities();
     result->timings = clock.Finish();
     return result;
+  }
+  if (scene.shadow.technique == ShadowTechniqueKind::kLightSweep) {
+    std::vector<LightReport> reports(scene.lights.size());
+    absl::StatusOr<DrawnImages> drawn =
+        DrawSweepFrame(request, particles, *plan, clock, stop, reports);
+    if (!drawn.ok()) return drawn.status();
+    return FinishFrame(request, *drawn, *std::move(plan), std::move(reports), particles, clock);
   }
   if (absl::Status status = CheckTargetSize(*plan, device()); !status.ok()) return status;
   gl::ForgetErrors();
@@ -184,17 +180,7 @@ absl::StatusOr<FrameResult> FrameRenderer::Render(const FrameRequest& request,
   }
   if (absl::Status status = gl::CheckErrors("frame"); !status.ok()) return status;
 
-  // Make the images that were asked for.
-  clock.BeginCpu("images");
-  FrameResult result;
-  for (const ImageRequest& image : request.images) {
-    result.images.push_back(SelectImage(image, scene, drawn));
-  }
-  result.plan = *std::move(plan);
-  result.lights = std::move(reports);
-  result.clamped_opacities = particles.clamped_opacities();
-  result.timings = clock.Finish();
-  return result;
+  return FinishFrame(request, drawn, *std::move(plan), std::move(reports), particles, clock);
 }
 
 }  // namespace halflight

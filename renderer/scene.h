@@ -22,6 +22,9 @@ inline constexpr float kMaxOpacity = 1.0F - 0x1p-20F;
 // Lights of a scene, at most.
 inline constexpr int kMaxLights = 16;
 
+// Of ShadowSettings::fit_degree.
+inline constexpr int kMaxFitDegree = 6;
+
 // A particle cloud. Every attribute but the position may be empty, which means that the material's
 // value serves for all particles; otherwise it has as many elements as positions.
 struct ParticleSet {
@@ -108,7 +111,8 @@ struct Material {
 
 enum class ShadowTechniqueKind : uint8_t {
   kHalfAngle,
-  kReference,  // the image model itself, on the CPU
+  kReference,   // the image model itself, on the CPU
+  kLightSweep,  // exact order along each light, fitted over footprints, on the CPU
 };
 enum class SliceSpacing : uint8_t { kEqualCount, kEqualOpticalDepth };
 enum class BlurMode : uint8_t { kDistance, kTexelsPerSlice };
@@ -121,6 +125,9 @@ struct ShadowSettings {
   int light_buffer_size = 512;  // texels along each side
   BlurMode blur_mode = BlurMode::kDistance;
   float blur_texels = 0.0F;  // with kTexelsPerSlice
+  // With kLightSweep: of the polynomial in which a particle keeps the light over its footprint, at
+  // most kMaxFitDegree.
+  int fit_degree = 4;
 
   bool operator==(const ShadowSettings&) const = default;
 };

@@ -8,6 +8,7 @@ const ShadowTechnique& TechniqueFor(ShadowTechniqueKind kind) {
   switch (kind) {
     case ShadowTechniqueKind::kHalfAngle:
     case ShadowTechniqueKind::kReference:
+    case ShadowTechniqueKind::kLightSweep:
       break;
   }
   static const HalfAngle half_angle;

@@ -41,7 +41,8 @@ class ShadowTechnique {
                                             LightReport& report) const = 0;
 };
 
-// Of all kinds but kReference, which draws no traversals (reference_frame.h).
+// Of the kinds that draw traversals: neither kReference (reference_frame.h) nor kLightSweep
+// (sweep/sweep_frame.h).
 const ShadowTechnique& TechniqueFor(ShadowTechniqueKind kind);
 
 }  // namespace halflight

@@ -156,11 +156,15 @@ void AddMaterialFlags(CLI::App& app, RenderOptions& options) {
 }
 
 void AddShadowFlags(CLI::App& app, RenderOptions& options) {
-  AddChoice<v1::ShadowTechnique>(
-      app, "--technique", options.technique,
-      {{"half-angle", v1::SHADOW_TECHNIQUE_HALF_ANGLE},
-       {"reference", v1::SHADOW_TECHNIQUE_REFERENCE}},
-      "How shadows are computed; reference: exactly, in float64 on the CPU");
+  AddChoice<v1::ShadowTechnique>(app, "--technique", options.technique,
+                                 {{"half-angle", v1::SHADOW_TECHNIQUE_HALF_ANGLE},
+                                  {"light-sweep", v1::SHADOW_TECHNIQUE_LIGHT_SWEEP},
+                                  {"reference", v1::SHADOW_TECHNIQUE_REFERENCE}},
+                                 "How shadows are computed: by slices; along each light, on the "
+                                 "CPU; or exactly, in float64 on "
+                                 "the CPU");
+  AddCount(app, "--fit-degree", options.fit_degree, 0, 6,
+           "Degree in which light-sweep keeps the light over a particle; default: 4");
   AddCount(app, "--slices", options.slices, 1, INT32_MAX, "Slices; default: 128");
   app.add_flag("--plain", options.plain, "Do not interpolate the light within a slice");
   AddChoice<v1::SliceSpacing>(app, "--spacing", options.spacing,

@@ -88,6 +88,7 @@ struct RenderOptions {
   bool plain = false;
   std::optional<v1::SliceSpacing> spacing;
   std::optional<uint32_t> light_buffer_size;
+  std::optional<uint32_t> fit_degree;
   std::optional<v1::BlurMode> blur_mode;
   std::optional<double> blur_texels;
   std::optional<uint32_t> supersample;

@@ -262,6 +262,9 @@ void ApplyShadowAndSampling(const RenderOptions& options, v1::Scene& scene) {
   if (options.light_buffer_size) {
     scene.mutable_shadow()->set_light_buffer_size(*options.light_buffer_size);
   }
+  if (options.fit_degree) {
+    scene.mutable_shadow()->set_fit_degree(*options.fit_degree);
+  }
   if (options.blur_texels) {
     scene.mutable_shadow()->set_blur_mode(v1::BLUR_MODE_TEXELS_PER_SLICE);
     scene.mutable_shadow()->set_blur_texels(static_cast<float>(*options.blur_texels));

@@ -139,6 +139,11 @@ ShadowSettings ConvertShadow(const v1::Shadow& shadow, const ServerLimits& limit
       checks.InRangeOr(path + ".light_buffer_size", shadow.light_buffer_size(), default_size,
                        {.low = static_cast<double>(kMinLightBufferSize),
                         .high = static_cast<double>(limits.max_light_buffer_size)}));
+  if (shadow.has_fit_degree()) {
+    converted.fit_degree =
+        static_cast<int>(checks.InRange(path + ".fit_degree", shadow.fit_degree(),
+                                        {.low = 0.0, .high = static_cast<double>(kMaxFitDegree)}));
+  }
   converted.blur_mode =
       FromProto(kBlurModes, shadow.blur_mode(), converted.blur_mode, path + ".blur_mode", checks);
   converted.blur_texels = shadow.blur_texels();
@@ -166,8 +171,8 @@ void CheckMoved(const ParticleSet& particles, double time_offset_s, FieldChecks&
   }
 }
 
-// Half-angle slicing looks at the particles from the light through one frustum, so that a light
-// among them would see only some.
+// A light buffer shows the particles from the light through one frustum, so that a light among them
+// would see only some.
 void CheckPointLights(const Scene& scene, FieldChecks& checks) {
   for (size_t i = 0; i < scene.lights.size(); ++i) {
     const auto* const point = std::get_if<PointLight>(&scene.lights[i].kind);
@@ -180,11 +185,13 @@ void CheckPointLights(const Scene& scene, FieldChecks& checks) {
     }
     const double distance = glm::length(point->position - bounds->center);
     if (!(distance > bounds->radius)) {
-      checks.Reject(fmt::format("scene.lighting.lights[{}].point.position", i),
-                    fmt::format("{} from the centre of the particles", distance),
-                    fmt::format("more than {}, the radius of their bounding sphere, for a light "
-                                "that casts shadows under SHADOW_TECHNIQUE_HALF_ANGLE",
-                                bounds->radius));
+      checks.Reject(
+          fmt::format("scene.lighting.lights[{}].point.position", i),
+          fmt::format("{} from the centre of the particles", distance),
+          fmt::format("more than {}, the radius of their bounding sphere, for a light "
+                      "that casts shadows under {}",
+                      bounds->radius,
+                      v1::ShadowTechnique_Name(ToProto(kTechniques, scene.shadow.technique))));
     }
   }
 }
@@ -229,7 +236,7 @@ Scene ConvertScene(const v1::Scene& scene, std::shared_ptr<const ParticleSet> pa
   if (converted.time_offset_s != 0.0) {
     CheckMoved(*converted.particles, converted.time_offset_s, checks);
   }
-  if (checks.ok() && converted.shadow.technique == ShadowTechniqueKind::kHalfAngle) {
+  if (checks.ok() && converted.shadow.technique != ShadowTechniqueKind::kReference) {
     CheckPointLights(converted, checks);
   }
   if (checks.ok() && converted.shadow.technique == ShadowTechniqueKind::kReference) {
@@ -263,6 +270,7 @@ v1::Shadow DescribeShadow(const ShadowSettings& shadow) {
   described.set_light_buffer_size(shadow.light_buffer_size);
   described.set_blur_mode(ToProto(kBlurModes, shadow.blur_mode));
   described.set_blur_texels(shadow.blur_texels);
+  described.set_fit_degree(shadow.fit_degree);
   return described;
 }
 

@@ -144,6 +144,7 @@ ImageMetadata DescribeImage(const FrameJob& job, const FrameResult& result,
       {"halflight:lightBufferSize", fmt::format("{}", shadow.light_buffer_size())},
       {"halflight:blurMode", v1::BlurMode_Name(shadow.blur_mode())},
       {"halflight:blurTexels", fmt::format("{}", shadow.blur_texels())},
+      {"halflight:fitDegree", fmt::format("{}", shadow.fit_degree())},
       {"halflight:renderer", device.gl_renderer},
       {"halflight:version", server_version},
   };

@@ -1,0 +1,295 @@
+#include "renderer/sweep/shading.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
+
+#include "renderer/parallel.h"
+#include "renderer/sweep/polynomial.h"
+
+namespace halflight::sweep {
+
+namespace {
+
+static_assert(kMaxTileLights >= 2 * kMaxLights);
+static_assert(kMaxDegree == kMaxFitDegree);
+
+using Coefficients = std::array<float, Terms(kMaxDegree)>;
+
+// Offsets from the centre in radii (view axes) for which scaled coordinates (1, 0) and (0, 1)
+// stand, to first order: offsets are perpendicular to the ray through the centre.
+struct Footprint {
+  glm::dvec3 x{1.0, 0.0, 0.0};
+  glm::dvec3 y{0.0, 1.0, 0.0};
+};
+
+Footprint FootprintOf(const Sprite& sprite, bool orthographic) {
+  Footprint footprint;
+  if (orthographic) return footprint;
+  const glm::dvec3 ray(sprite.x, sprite.y, -1.0);
+  const double inverse = 1.0 / glm::dot(ray, ray);
+  footprint.x -= ray * (ray.x * inverse);
+  footprint.y -= ray * (ray.y * inverse);
+  return footprint;
+}
+
+// Henyey and Greenstein 1941, scaled so that g = 0 gives 1.
+double PhaseFunction(double g, double cosine) {
+  const double d = 1.0 + g * g - 2.0 * g * cosine;
+  return (1.0 - g * g) / (d * std::sqrt(d));
+}
+
+// Radiance that a light would have at `at` for a ray along `ray` (both view axes, `at` from the
+// eye), relative to its colour.
+class RadianceFactor {
+ public:
+  RadianceFactor(const Light& light, const Material& material, const glm::dmat4& view_from_world)
+      : g_(material.phase_g) {
+    if (const auto* point = std::get_if<PointLight>(&light.kind)) {
+      position_ = glm::dvec3(view_from_world * glm::dvec4(point->position, 1.0));
+      point_ = true;
+      falloff_ = point->inverse_square_falloff;
+    } else {
+      travel_ = glm::dmat3(view_from_world) * std::get<DirectionalLight>(light.kind).direction;
+    }
+  }
+
+  [[nodiscard]] double operator()(const glm::dvec3& at, const glm::dvec3& ray) const {
+    const glm::dvec3 travel = point_ ? at - position_ : travel_;
+    const double squared = std::max(glm::dot(travel, travel), 1e-300);
+    const double cosine = -glm::dot(travel, ray) / std::sqrt(squared * glm::dot(ray, ray));
+    return (g_ != 0.0 ? PhaseFunction(g_, cosine) : 1.0) / (falloff_ ? squared : 1.0);
+  }
+
+ private:
+  double g_;
+  glm::dvec3 travel_{0.0};
+  glm::dvec3 position_{0.0};
+  bool point_ = false;
+  bool falloff_ = false;
+};
+
+bool Varies(const Light& light, const Material& material) {
+  const auto* point = std::get_if<PointLight>(&light.kind);
+  return material.phase_g != 0.0F || (point != nullptr && point->inverse_square_falloff);
+}
+
+// -ln(value(x, y) / value(0, 0)) as a polynomial through values half way to the rim.
+template <typename Value>
+Coefficients FitExponent(const Value& value, double at_center, int degree) {
+  constexpr double kStep = 0.6;
+  const auto f = [&](double x, double y) {
+    return -std::log(std::max(value(x * kStep, y * kStep) / at_center, 1e-30));
+  };
+  Coefficients fit = {};
+  if (degree == 0) return fit;
+  const double right = f(1, 0);
+  const double left = f(-1, 0);
+  const double up = f(0, 1);
+  const double down = f(0, -1);
+  const double x = 0.5 * (right - left);
+  const double y = 0.5 * (up - down);
+  fit[TermIndex(degree, 1, 0)] = static_cast<float>(x / kStep);
+  fit[TermIndex(degree, 0, 1)] = static_cast<float>(y / kStep);
+  if (degree == 1) return fit;
+  const double xx = 0.5 * (right + left);
+  const double yy = 0.5 * (up + down);
+  constexpr double kSquare = kStep * kStep;
+  fit[TermIndex(degree, 2, 0)] = static_cast<float>(xx / kSquare);
+  fit[TermIndex(degree, 0, 2)] = static_cast<float>(yy / kSquare);
+  fit[TermIndex(degree, 1, 1)] = static_cast<float>((f(1, 1) - x - y - xx - yy) / kSquare);
+  return fit;
+}
+
+// How a light's scaled coordinates grow with the offset in radii (view axes), around one particle.
+struct LightAxes {
+  glm::dvec3 x{0.0};
+  glm::dvec3 y{0.0};
+};
+
+LightAxes AxesOf(const LightFit& fit, uint32_t particle, double optical_depth,
+                 const glm::dmat3& view_from_eye_view) {
+  const Sprite& sprite = fit.sprites[particle];
+  // Enlarged particles keep tau r^2, which tells by how much they were.
+  const double radii = optical_depth > 0.0 ? std::sqrt(sprite.optical_depth / optical_depth) : 1.0;
+  // Rows of the rotation: the light's axes in the eye's.
+  const glm::dmat3 axes = glm::transpose(view_from_eye_view);
+  LightAxes light{axes[0] * radii, axes[1] * radii};
+  if (!fit.projection.orthographic) {
+    light.x += axes[2] * (radii * sprite.x);
+    light.y += axes[2] * (radii * sprite.y);
+  }
+  return light;
+}
+
+Rgb ToRgb(const glm::vec3& color) { return {color.x, color.y, color.z}; }
+
+std::vector<TileLight> ListLights(const Scene& scene, const std::vector<const LightFit*>& fits,
+                                  bool keep_transmittance) {
+  std::vector<TileLight> lights;
+  for (size_t l = 0; l < scene.lights.size(); ++l) {
+    const bool varies = Varies(scene.lights[l], scene.material);
+    const auto index = static_cast<int>(l);
+    if (fits[l] != nullptr || varies) lights.push_back({index, fits[l], varies, true});
+    // Its exponent holds more than the shadow: the transmittance wants one of its own.
+    if (fits[l] != nullptr && varies && keep_transmittance) {
+      lights.push_back({index, fits[l], false, false});
+    }
+  }
+  return lights;
+}
+
+}  // namespace
+
+ShadedSprites Shading::View(const SpriteList& list) const {
+  ShadedSprites view;
+  view.sprites = list.sprites.data();
+  view.rows = rows.data();
+  view.unshadowed = unshadowed.data();
+  view.depth = depth.empty() ? nullptr : depth.data();
+  view.lights = static_cast<int>(lights.size());
+  view.exponents = exponents;
+  view.shadow_alone = shadow_alone.data();
+  view.degree = degree;
+  view.lit = lit.data();
+  view.exponent = exponent.data();
+  view.near = list.near.empty() ? nullptr : list.near.data();
+  view.near_lights = near_lights.data();
+  return view;
+}
+
+int Shading::SlotOf(int light) const {
+  int slot = 0;
+  for (size_t i = 0; i < lights.size(); ++i) {
+    if (lights[i].light == light) slot = static_cast<int>(i);  // the last: without variation
+  }
+  return slot;
+}
+
+double NearDepth(const Scene& scene) {
+  constexpr double kWide = 8.0;
+  const bool varies =
+      std::any_of(scene.lights.begin(), scene.lights.end(),
+                  [&](const Light& light) { return Varies(light, scene.material); });
+  return varies ? 0.0 : kWide;
+}
+
+Shading ShadeSprites(const Scene& scene, const ParticleView& particles, const Projection& eye,
+                     const SpriteList& list, const std::vector<const LightFit*>& fits, int degree,
+                     bool keep_depth, bool keep_transmittance) {
+  const Material& material = scene.material;
+  const ParticleSet& set = particles.set();
+  const size_t count = list.sprites.size();
+  Shading shading;
+  shading.lights = ListLights(scene, fits, keep_transmittance);
+  shading.degree = degree;
+  glm::vec3 constant = material.ambient;
+  std::vector<RadianceFactor> factors;
+  std::vector<glm::dmat3> rotations;
+  for (const TileLight& light : shading.lights) {
+    const Light& source = scene.lights[static_cast<size_t>(light.light)];
+    shading.exponents = source.colored_density() && light.fit != nullptr ? 3 : shading.exponents;
+    shading.shadow_alone[factors.size()] = !light.varies;
+    factors.emplace_back(source, material, eye.view_from_world);
+    rotations.push_back(light.fit == nullptr ? glm::dmat3(1.0)
+                                             : glm::dmat3(light.fit->projection.view_from_world) *
+                                                   glm::transpose(glm::dmat3(eye.view_from_world)));
+  }
+  for (size_t l = 0; l < scene.lights.size(); ++l) {
+    if (fits[l] == nullptr && !Varies(scene.lights[l], material)) constant += scene.lights[l].color;
+  }
+
+  const size_t lights = shading.lights.size();
+  const auto terms = static_cast<size_t>(Terms(degree));
+  const auto exponents = static_cast<size_t>(shading.exponents);
+  shading.rows.resize(2 * count);
+  shading.unshadowed.resize(count);
+  if (keep_depth) shading.depth.resize(3 * count);
+  shading.lit.resize(count * lights);
+  shading.exponent.resize(count * lights * exponents * terms);
+  if (!list.near.empty()) shading.near_lights.resize(count * lights);
+  ParallelRanges(count, [&](const WorkRange& range) {
+    for (size_t place = range.begin; place < range.end; ++place) {
+      if (list.rects[place].empty()) continue;
+      const uint32_t i = list.particles[place];
+      const Sprite& sprite = list.sprites[place];
+      const bool near = !eye.orthographic && sprite.scale == 0.0F;
+      shading.rows[2 * place] = list.rects[place].y_begin;
+      shading.rows[2 * place + 1] = list.rects[place].y_end;
+      const glm::vec3 albedo =
+          set.colors.empty() ? material.albedo : material.albedo * set.colors[i];
+      shading.unshadowed[place] =
+          ToRgb(albedo * constant + (set.emissions.empty() ? material.emission : set.emissions[i]));
+
+      const double radius = particles.radius(i);
+      const Footprint footprint = FootprintOf(sprite, eye.orthographic);
+      glm::dvec3 center(sprite.x, sprite.y, -1.0);  // view axes, from the eye
+      if (near) {
+        const float* const c = list.near[place].center;
+        center = radius * glm::dvec3(c[0], c[1], c[2]);
+      } else if (!eye.orthographic) {
+        center *= sprite.scale * radius;
+      } else {
+        const glm::dvec3 view = glm::dmat3(eye.view_from_world) *
+                                (glm::dvec3(particles.positions()[i]) + (set.origin - eye.eye()));
+        center = view;
+      }
+      if (keep_depth) {
+        float* const depth = &shading.depth[3 * place];
+        depth[0] = static_cast<float>(-center.z);
+        depth[1] = static_cast<float>(near ? radius : -radius * footprint.y.z);
+        depth[2] = static_cast<float>(near ? 0.0 : -radius * footprint.x.z);
+      }
+
+      for (size_t l = 0; l < lights; ++l) {
+        const TileLight& light = shading.lights[l];
+        const Light& source = scene.lights[static_cast<size_t>(light.light)];
+        double factor = 1.0;
+        Coefficients varying = {};
+        if (light.varies) {
+          const auto ray_at = [&](double x, double y) {
+            if (eye.orthographic) return glm::dvec3(0.0, 0.0, -1.0);
+            if (near) return glm::normalize(center);
+            return glm::dvec3(sprite.x + x / sprite.scale, sprite.y + y / sprite.scale, -1.0);
+          };
+          const auto value = [&](double x, double y) {
+            return factors[l](center + radius * (x * footprint.x + y * footprint.y), ray_at(x, y));
+          };
+          factor = value(0.0, 0.0);
+          if (!near) varying = FitExponent(value, factor, degree);
+        }
+        shading.lit[place * lights + l] =
+            light.adds ? ToRgb(albedo * source.color * static_cast<float>(factor)) : Rgb{};
+
+        float* const own = &shading.exponent[(place * lights + l) * exponents * terms];
+        for (size_t e = 0; e < exponents; ++e) {
+          const std::span<float> out(own + e * terms, terms);
+          if (light.fit != nullptr) {
+            const LightAxes axes = AxesOf(*light.fit, i, particles.optical_depth(i), rotations[l]);
+            const std::span<const float> depth(&light.fit->depth[i * terms], terms);
+            const double density = source.shadow_density[static_cast<glm::length_t>(e)];
+            if (near) {
+              for (size_t t = 0; t < terms; ++t) out[t] = static_cast<float>(density * depth[t]);
+              const auto narrow = [](const glm::dvec3& v, float* to) {
+                for (int k = 0; k < 3; ++k) to[k] = static_cast<float>(v[k]);
+              };
+              narrow(axes.x, shading.near_lights[place * lights + l].x);
+              narrow(axes.y, shading.near_lights[place * lights + l].y);
+            } else {
+              Substitute(
+                  degree, depth, {glm::dot(axes.x, footprint.x), glm::dot(axes.y, footprint.x)},
+                  {glm::dot(axes.x, footprint.y), glm::dot(axes.y, footprint.y)}, density, out);
+            }
+          }
+          for (size_t t = 0; t < terms; ++t) out[t] += varying[t];
+        }
+      }
+    }
+  });
+  return shading;
+}
+
+}  // namespace halflight::sweep

@@ -1,0 +1,81 @@
+// Eight floats at a time, by the compiler's vector extension: AVX where the file is compiled for
+// it, pairs of SSE or NEON registers elsewhere. Only what the sweep's kernels need.
+#pragma once
+
+#include <cstdint>
+#include <cstring>
+
+namespace halflight::simd {
+
+inline constexpr int kLanes = 8;
+
+using Floats = float __attribute__((vector_size(kLanes * sizeof(float))));
+using Ints = int32_t __attribute__((vector_size(kLanes * sizeof(int32_t))));
+
+#define HALFLIGHT_INLINE [[gnu::always_inline]] static inline
+
+HALFLIGHT_INLINE Floats All(float value) { return value - Floats{}; }
+
+HALFLIGHT_INLINE Floats Load(const float* from) {
+  Floats value;
+  std::memcpy(&value, from, sizeof(value));
+  return value;
+}
+
+HALFLIGHT_INLINE void Store(const Floats& value, float* to) {
+  std::memcpy(to, &value, sizeof(value));
+}
+
+HALFLIGHT_INLINE Floats Max(const Floats& a, const Floats& b) { return a > b ? a : b; }
+HALFLIGHT_INLINE Floats Min(const Floats& a, const Floats& b) { return a < b ? a : b; }
+
+HALFLIGHT_INLINE Floats Sqrt(const Floats& x) {
+  Floats root{};
+  for (int i = 0; i < kLanes; ++i) root[i] = __builtin_sqrtf(x[i]);
+  return root;
+}
+
+HALFLIGHT_INLINE float Sum(const Floats& x) {
+  return ((x[0] + x[4]) + (x[1] + x[5])) + ((x[2] + x[6]) + (x[3] + x[7]));
+}
+
+// 2^n and f q(f), of which exp(-x) = 2^n (1 + f q(f)), for x in [-41, 87] and these bounds beyond:
+// so much that nothing overflows where it is multiplied by 0. The polynomial is 2^f - 1 on
+// [-1/2, 1/2], its Taylor series to degree 7, whose rest is below 6e-9.
+struct ExpParts {
+  Floats power;
+  Floats fraction;
+};
+HALFLIGHT_INLINE ExpParts SplitExpOfMinus(const Floats& x) {
+  constexpr float kLog2E = 1.44269504F;
+  constexpr float kRound = 12582912.0F;  // 1.5 * 2^23: adding it rounds to whole numbers
+  const Floats t = Min(Max(x * -kLog2E, All(-126.0F)), All(60.0F));
+  const Floats shifted = t + kRound;
+  const Floats whole = shifted - kRound;
+  const Floats f = (t - whole) * 0.693147181F;
+  Floats q = All(1.0F / 5040.0F);
+  q = q * f + 1.0F / 720.0F;
+  q = q * f + 1.0F / 120.0F;
+  q = q * f + 1.0F / 24.0F;
+  q = q * f + 1.0F / 6.0F;
+  q = q * f + 0.5F;
+  q = q * f + 1.0F;
+  const Ints exponent = (__builtin_convertvector(whole, Ints) + 127) << 23;
+  Floats power;
+  std::memcpy(&power, &exponent, sizeof(power));
+  return {power, f * q};
+}
+
+// exp(-x), from 2^-126 to 2^60.
+HALFLIGHT_INLINE Floats ExpOfMinus(const Floats& x) {
+  const ExpParts parts = SplitExpOfMinus(x);
+  return parts.power * parts.fraction + parts.power;
+}
+
+// 1 - exp(-x), x >= 0, with all its digits where x is small.
+HALFLIGHT_INLINE Floats OpacityOf(const Floats& x) {
+  const ExpParts parts = SplitExpOfMinus(x);
+  return (1.0F - parts.power) - parts.power * parts.fraction;
+}
+
+}  // namespace halflight::simd
