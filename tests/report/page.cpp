@@ -41,7 +41,7 @@ class Writer {
     absl::StrAppend(
         &text_, "## Error against time\n\n",
         "Left and low is better. Filled marks on the broad line are the Pareto front: nothing "
-        "measured is both faster and nearer. Numbers are slices.\n\n");
+        "measured is both faster and nearer. Numbers are slices, of the light sweep degrees.\n\n");
     for (const auto& [opacity, value] : Opacities()) {
       absl::StrAppendFormat(&text_, "![Error against time, %s smoke](error-%s.svg)\n\n", opacity,
                             opacity);

@@ -8,8 +8,8 @@
 namespace halflight::report {
 
 // Error against time, one chart for each light of the matrix's scenes of this opacity: the worst
-// error of a setting and the median of its times. Curves join settings that differ in slices alone;
-// what lies on the Pareto front is filled, joined and labelled.
+// error of a setting and the median of its times. Curves join settings that differ in slices or
+// degree alone; what lies on the Pareto front is filled, joined and labelled.
 std::string PlotErrorAgainstTime(const Results& results, const std::string& opacity);
 
 // Time against the number of particles.

@@ -8,7 +8,7 @@
 namespace halflight::report {
 namespace {
 
-constexpr int kNoSlices = 0;  // of a technique that has none
+constexpr int kNoSteps = -1;  // of a technique that has none
 constexpr size_t kAll = std::numeric_limits<size_t>::max();
 
 // To add a technique: a row, and its name in FlagOf. Names hold no commas, for the sake of CSV.
@@ -18,9 +18,9 @@ struct Curve {
   bool interpolate;
   int light_buffer_size;  // 0: the technique has none
   int downsample;
-  std::vector<int> slices;
-  // Measured against the number of particles: these slices, up to so many particles.
-  int scaling_slices;
+  std::vector<int> steps;  // slices, or of the light sweep degrees
+  // Measured against the number of particles: this step, up to so many particles.
+  int scaling_step;
   size_t scaling_most;
 };
 
@@ -29,10 +29,12 @@ std::vector<Curve> Curves() {
   return {
       {"plain", kHalfAngle, false, 512, 1, {16, 64, 256, 512}, 64, kAll},
       {"interpolated", kHalfAngle, true, 512, 1, {32, 128, 512}, 128, kAll},
-      {"interpolated (buffer 256)", kHalfAngle, true, 256, 1, {64, 256}, 0, 0},
+      {"interpolated (buffer 256)", kHalfAngle, true, 256, 1, {64, 256}, kNoSteps, 0},
       {"half resolution", kHalfAngle, true, 256, 2, {16, 32, 64, 128, 256}, 64, kAll},
       {"quarter resolution", kHalfAngle, true, 128, 4, {16, 64, 256}, 64, kAll},
-      {"reference", kReference, false, 0, 1, {kNoSlices}, kNoSlices, 65'536},
+      {"light sweep", kLightSweep, false, 256, 1, {1, 2, 3, 4, 6}, 4, kAll},
+      {"light sweep at half resolution", kLightSweep, false, 128, 2, {1, 2, 4}, 2, kAll},
+      {"reference", kReference, false, 0, 1, {kNoSteps}, kNoSteps, 65'536},
   };
 }
 
@@ -42,29 +44,36 @@ const char* FlagOf(ShadowTechniqueKind technique) {
       return "half-angle";
     case ShadowTechniqueKind::kReference:
       return "reference";
+    case ShadowTechniqueKind::kLightSweep:
+      return "light-sweep";
   }
   return "";
 }
 
-Setting SettingOf(const Curve& curve, size_t index, int slices) {
+Setting SettingOf(const Curve& curve, size_t index, int step) {
   Setting setting;
   setting.curve = curve.name;
   setting.curve_index = index;
   setting.shadow.technique = curve.technique;
   setting.sampling.downsample = curve.downsample;
   setting.flags = absl::StrCat("--technique ", FlagOf(curve.technique));
-  if (slices != kNoSlices) {
-    setting.label = absl::StrCat(slices);
-    setting.shadow.slices = slices;
+  setting.name = curve.name;
+  if (step != kNoSteps) setting.label = absl::StrCat(step);
+  if (curve.technique == ShadowTechniqueKind::kHalfAngle) {
+    setting.name = absl::StrCat(step, " ", curve.name);
+    setting.shadow.slices = step;
     setting.shadow.interpolate = curve.interpolate;
-    absl::StrAppend(&setting.flags, " --slices ", slices, curve.interpolate ? "" : " --plain");
+    absl::StrAppend(&setting.flags, " --slices ", step, curve.interpolate ? "" : " --plain");
+  } else if (curve.technique == ShadowTechniqueKind::kLightSweep) {
+    setting.name = absl::StrCat(curve.name, " of degree ", step);
+    setting.shadow.fit_degree = step;
+    absl::StrAppend(&setting.flags, " --fit-degree ", step);
   }
   if (curve.light_buffer_size > 0) {
     setting.shadow.light_buffer_size = curve.light_buffer_size;
     absl::StrAppend(&setting.flags, " --light-buffer ", curve.light_buffer_size);
   }
   if (curve.downsample > 1) absl::StrAppend(&setting.flags, " --downsample ", curve.downsample);
-  setting.name = slices != kNoSlices ? absl::StrCat(slices, " ", curve.name) : curve.name;
   return setting;
 }
 
@@ -76,11 +85,11 @@ std::vector<Setting> ListSettings(bool short_form) {
   const std::vector<Curve> curves = Curves();
   std::vector<Setting> settings;
   for (size_t i = 0; i < curves.size(); ++i) {
-    for (const int slices : curves[i].slices) {
-      const bool scaling = slices == curves[i].scaling_slices;
-      if (short_form && !scaling && slices != kShortSlices) continue;
-      Setting setting = SettingOf(curves[i], i, slices);
-      setting.baseline = i == 0 && slices == kBaselineSlices;
+    for (const int step : curves[i].steps) {
+      const bool scaling = step == curves[i].scaling_step && curves[i].scaling_most > 0;
+      if (short_form && !scaling && step != kShortSlices) continue;
+      Setting setting = SettingOf(curves[i], i, step);
+      setting.baseline = i == 0 && step == kBaselineSlices;
       setting.scaling_most = scaling ? curves[i].scaling_most : 0;
       settings.push_back(std::move(setting));
     }

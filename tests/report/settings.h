@@ -1,5 +1,5 @@
-// The settings that the report compares, as curves: one way of drawing, at rising slice counts.
-// Leaves out what they are measured on; see scenes.h.
+// The settings that the report compares, as curves: one way of drawing, at rising numbers of slices
+// or degrees. Leaves out what they are measured on; see scenes.h.
 #pragma once
 
 #include <cstddef>
@@ -14,7 +14,7 @@ struct Setting {
   std::string curve;  // the name of its row in the table of settings.cpp
   size_t curve_index;
   std::string name;   // the curve's, and what sets it apart on the curve: one name, one setting
-  std::string label;  // the latter alone: its slices; empty where the technique has none
+  std::string label;  // the latter alone: its slices or degree; empty where the technique has none
   std::string flags;  // of `halflight render`
   ShadowSettings shadow;
   Sampling sampling;
