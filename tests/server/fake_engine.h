@@ -39,6 +39,8 @@ class FakeEngine : public FrameEngine {
 
   [[nodiscard]] int rendered() const;
   [[nodiscard]] int waiting() const;
+  // How often Submit has refused.
+  [[nodiscard]] int refused() const;
   [[nodiscard]] FrameRequest last_request() const;
 
  private:
@@ -57,6 +59,7 @@ class FakeEngine : public FrameEngine {
   bool open_ = true;
   bool closing_ = false;
   int rendered_ = 0;
+  int refused_ = 0;
   absl::Status failure_;
   absl::Status refusal_;
   FrameRequest last_request_;
