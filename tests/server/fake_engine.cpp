@@ -40,6 +40,11 @@ void FakeEngine::FailWith(absl::Status status) {
   failure_ = std::move(status);
 }
 
+void FakeEngine::PretendMilliseconds(double milliseconds) {
+  const std::lock_guard lock(mutex_);
+  milliseconds_ = milliseconds;
+}
+
 void FakeEngine::RefuseWith(absl::Status status) {
   const std::lock_guard lock(mutex_);
   refusal_ = std::move(status);
@@ -94,7 +99,7 @@ void FakeEngine::Work() {
       for (const Light& light : job.request.scene.lights) {
         frame.lights.push_back({.casts_shadows = light.casts_shadows(), .slices = 2});
       }
-      frame.timings.push_back({"composite", 0.25});
+      frame.timings.push_back({"composite", milliseconds_});
       result = std::move(frame);
       ++rendered_;
       last_request_ = job.request;

@@ -34,6 +34,8 @@ class FakeEngine : public FrameEngine {
   void SetGate(bool open);
   // What each frame comes to from now on; OK renders it.
   void FailWith(absl::Status status);
+  // What frames are said to take from now on.
+  void PretendMilliseconds(double milliseconds);
   // What Submit says from now on.
   void RefuseWith(absl::Status status);
 
@@ -60,6 +62,7 @@ class FakeEngine : public FrameEngine {
   bool closing_ = false;
   int rendered_ = 0;
   int refused_ = 0;
+  double milliseconds_ = 0.25;
   absl::Status failure_;
   absl::Status refusal_;
   FrameRequest last_request_;

@@ -141,6 +141,7 @@ TEST_F(Search, StraddlingIntervalIsMeasuredAgainWithMoreSamples) {
   request.mutable_measure_error()->set_samples(100);
   request.mutable_measure_error()->set_seed(9);
   StartShowing({0.99 * kGoal, 0.9 * kGoal});
+  engine_.PretendMilliseconds(1e6);
   const v1::FrameHeader header = HeaderOf(request);
   EXPECT_TRUE(header.target().met());
   EXPECT_EQ(header.target().attempts_size(), 1);
@@ -161,6 +162,7 @@ TEST_F(Search, KeepsMeasurementsWithinTheLimitOnTheirWork) {
   ServerLimits limits;
   limits.max_reference_work = uint64_t{500} * 100000;
   StartShowing({0.99 * kGoal, 0.9 * kGoal});
+  engine_.PretendMilliseconds(1e6);
   ASSERT_TRUE(Submit(MustConvert(request, limits)).get().ok());
   ASSERT_EQ(jobs_.size(), 2U);
   EXPECT_EQ(jobs_[1].sample->samples, 100000);
