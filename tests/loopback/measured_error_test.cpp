@@ -34,7 +34,7 @@ TEST_F(MeasuredError, OfThePlumeHoldsTheTrueOne) {
   const Scene scene = Plume();
   ASSERT_NE(scene.particles, nullptr);
   const auto whole =
-      Render(RequestOf(scene, {v1::OUTPUT_KIND_BEAUTY, v1::OUTPUT_KIND_ERROR}), scene);
+      Render(RequestFor(scene, {v1::OUTPUT_KIND_BEAUTY, v1::OUTPUT_KIND_ERROR}), scene);
   const std::vector<float> beauty = FloatsOf(whole.outputs[0]);
   const Truth truth(beauty, FloatsOf(whole.outputs[1]));
   ASSERT_GT(truth.covered, 2000U);
@@ -42,7 +42,7 @@ TEST_F(MeasuredError, OfThePlumeHoldsTheTrueOne) {
   EXPECT_EQ(whole.header.error().sampled_pixels(), truth.covered);
   EXPECT_NEAR(whole.header.error().relative_rmse().value(), truth.relative_rmse, 1e-9);
 
-  v1::RenderFrameRequest request = RequestOf(scene, {v1::OUTPUT_KIND_BEAUTY});
+  v1::RenderFrameRequest request = RequestFor(scene, {v1::OUTPUT_KIND_BEAUTY});
   request.mutable_measure_error()->set_seed(5);  // of a hundred seeds, intervals miss with five
   const auto sampled = Render(request, scene);
   EXPECT_EQ(FloatsOf(sampled.outputs[0]), beauty) << "measuring does not change the frame";
@@ -71,7 +71,7 @@ TEST_F(MeasuredError, OfThePlumeHoldsTheTrueOne) {
 TEST_F(MeasuredError, OfTheReferenceIsRoundingAlone) {
   Scene scene = test::BallScene(300, 48);
   v1::RenderFrameRequest request =
-      RequestOf(scene, {v1::OUTPUT_KIND_BEAUTY, v1::OUTPUT_KIND_ERROR});
+      RequestFor(scene, {v1::OUTPUT_KIND_BEAUTY, v1::OUTPUT_KIND_ERROR});
   request.mutable_scene()->mutable_shadow()->set_technique(v1::SHADOW_TECHNIQUE_REFERENCE);
   const auto map = Render(request, scene);
   for (const float off : FloatsOf(map.outputs[1])) {
@@ -88,7 +88,7 @@ TEST_F(MeasuredError, OfTheReferenceIsRoundingAlone) {
 TEST_F(MeasuredError, OfAnEmptyImageIsZero) {
   Scene scene = test::BallScene(300, 48);
   scene.camera = test::LookAt({0, 0, 4}, {0, 0, 8}, 48, 48);
-  v1::RenderFrameRequest request = RequestOf(scene, {v1::OUTPUT_KIND_BEAUTY});
+  v1::RenderFrameRequest request = RequestFor(scene, {v1::OUTPUT_KIND_BEAUTY});
   request.mutable_measure_error();
   for (const bool map : {false, true}) {
     if (map) {
@@ -105,11 +105,11 @@ TEST_F(MeasuredError, OfAnEmptyImageIsZero) {
 
 TEST_F(MeasuredError, OfScatteringIsThatOfTheFrameWithout) {
   Scene scene = test::BallScene(300, 48);
-  v1::RenderFrameRequest plain = RequestOf(scene, {v1::OUTPUT_KIND_BEAUTY, v1::OUTPUT_KIND_ERROR});
+  v1::RenderFrameRequest plain = RequestFor(scene, {v1::OUTPUT_KIND_BEAUTY, v1::OUTPUT_KIND_ERROR});
   const auto without = Render(plain, scene);
   scene.material.scattering_spread = 0.3F;
   const auto with =
-      Render(RequestOf(scene, {v1::OUTPUT_KIND_BEAUTY, v1::OUTPUT_KIND_ERROR}), scene);
+      Render(RequestFor(scene, {v1::OUTPUT_KIND_BEAUTY, v1::OUTPUT_KIND_ERROR}), scene);
   EXPECT_NE(with.outputs[0], without.outputs[0]);
   EXPECT_EQ(with.outputs[1], without.outputs[1]);
   EXPECT_EQ(with.header.error().compared(), v1::COMPARED_FRAME_WITHOUT_SCATTERING);
@@ -119,7 +119,7 @@ TEST_F(MeasuredError, OfScatteringIsThatOfTheFrameWithout) {
 
 TEST_F(MeasuredError, CountsWhatDownsamplingLoses) {
   Scene scene = test::BallScene(300, 48);
-  v1::RenderFrameRequest request = RequestOf(scene, {v1::OUTPUT_KIND_BEAUTY});
+  v1::RenderFrameRequest request = RequestFor(scene, {v1::OUTPUT_KIND_BEAUTY});
   request.mutable_measure_error();
   const double full = Render(request, scene).header.error().relative_rmse().value();
   request.mutable_scene()->mutable_sampling()->set_downsample(4);
@@ -131,7 +131,7 @@ TEST_F(MeasuredError, CountsWhatDownsamplingLoses) {
 TEST_F(MeasuredError, IsInTheFilesAndPlacedInTheCrop) {
   Scene scene = test::BallScene(300, 64);
   scene.camera.window = {16, 24, 32, 20};
-  v1::RenderFrameRequest request = RequestOf(scene, {v1::OUTPUT_KIND_ERROR});
+  v1::RenderFrameRequest request = RequestFor(scene, {v1::OUTPUT_KIND_ERROR});
   request.clear_outputs();
   *request.add_outputs() = OutputOf(v1::OUTPUT_KIND_BEAUTY, v1::IMAGE_FORMAT_EXR_HALF);
   *request.add_outputs() = OutputOf(v1::OUTPUT_KIND_BEAUTY, v1::IMAGE_FORMAT_PNG8);

@@ -14,7 +14,7 @@ namespace halflight::loopback {
 namespace {
 
 v1::RenderFrameRequest TargetOf(const Scene& scene, const std::vector<v1::OutputKind>& kinds) {
-  v1::RenderFrameRequest request = RequestOf(scene, kinds);
+  v1::RenderFrameRequest request = RequestFor(scene, kinds);
   request.mutable_scene()->clear_shadow();
   return request;
 }

@@ -25,8 +25,8 @@ inline Scene Plume() {
 }
 
 // Asks for raw floats of these, without sending the particles.
-inline v1::RenderFrameRequest RequestOf(const Scene& scene,
-                                        const std::vector<v1::OutputKind>& kinds) {
+inline v1::RenderFrameRequest RequestFor(const Scene& scene,
+                                         const std::vector<v1::OutputKind>& kinds) {
   v1::RenderFrameRequest request = RequestWithoutParticles(scene);
   for (const v1::OutputKind kind : kinds) {
     *request.add_outputs() = OutputOf(kind);
