@@ -38,20 +38,24 @@ void AppendOutcome(std::string& line, const absl::Status& outcome) {
 
 }  // namespace
 
-std::string FrameLogLine(const FrameJob& job, const std::vector<StageTiming>& timings,
-                         const std::optional<ErrorEstimate>& error, const absl::Status& outcome) {
+std::string FrameLogLine(const FrameJob& job, const MadeFrame& frame, const absl::Status& outcome) {
   const Scene& scene = job.request.scene;
   std::string line = fmt::format(
       "frame request_id={} technique={} particles={} size={}x{} outputs={}", Quoted(job.request_id),
       v1::ShadowTechnique_Name(ToProto(kTechniques, scene.shadow.technique)),
       scene.particles->size(), scene.camera.window.width, scene.camera.window.height,
       job.outputs.size());
-  for (const StageTiming& timing : timings) {
+  for (const StageTiming& timing : frame.rendered.timings) {
     fmt::format_to(std::back_inserter(line), " {}_ms={:.2f}", Key(timing.stage),
                    timing.milliseconds);
   }
-  if (error.has_value()) {
-    fmt::format_to(std::back_inserter(line), " relative_rmse={:.4g}", error->relative_rmse.value);
+  if (frame.error.has_value()) {
+    fmt::format_to(std::back_inserter(line), " relative_rmse={:.4g}",
+                   frame.error->relative_rmse.value);
+  }
+  if (frame.target.has_value()) {
+    fmt::format_to(std::back_inserter(line), " attempts={} target_met={}",
+                   frame.target->attempts.size(), frame.target->met);
   }
   AppendOutcome(line, outcome);
   return line;

@@ -1,22 +1,18 @@
 // One structured log line a frame: key=value pairs, one place for all of them. Keeps no history.
 #pragma once
 
-#include <optional>
 #include <string>
-#include <vector>
 
 #include "absl/status/status.h"
-#include "renderer/error_estimate.h"
-#include "renderer/frame.h"
 #include "server/convert/convert_frame.h"
+#include "server/made_frame.h"
 
 namespace halflight {
 
 // As it is written: request_id="a" technique=HALF_ANGLE particles=65536 size=640x480 outputs=2
-// render_ms=12.3 ... outcome=OK. A measured error adds relative_rmse=0.031, a failure
-// message="...".
-std::string FrameLogLine(const FrameJob& job, const std::vector<StageTiming>& timings,
-                         const std::optional<ErrorEstimate>& error, const absl::Status& outcome);
+// render_ms=12.3 ... outcome=OK. A measured error adds relative_rmse=0.031, a target attempts=2
+// target_met=true, a failure message="...". Of a frame that failed only the timings are looked at.
+std::string FrameLogLine(const FrameJob& job, const MadeFrame& frame, const absl::Status& outcome);
 
 // A request that never became a frame.
 std::string RefusalLogLine(const std::string& request_id, const absl::Status& outcome);

@@ -4,6 +4,7 @@
 #include <atomic>
 #include <chrono>
 #include <optional>
+#include <thread>
 #include <utility>
 
 #include <fmt/format.h>
@@ -11,6 +12,7 @@
 
 #include "halflight/sha256.h"
 #include "server/convert/describe.h"
+#include "server/convert/field_checks.h"
 #include "server/frame_log.h"
 #include "server/retry_hint.h"
 #include "server/status_text.h"
@@ -19,6 +21,10 @@ namespace halflight {
 namespace {
 
 using Clock = std::chrono::steady_clock;
+
+// How soon a frame that was accepted asks again, where the engine had no room for it. Short against
+// the time of a frame.
+constexpr auto kAskAgain = std::chrono::milliseconds(5);
 
 double Milliseconds(Clock::duration duration) {
   return std::chrono::duration<double, std::milli>(duration).count();
@@ -43,11 +49,10 @@ struct FramePipeline::Flight {
   Clock::time_point submitted;
 
   absl::Status outcome;  // of the stages before, or of the first output that failed, under `mutex`
-  FrameResult rendered;  // its images: those of the request, then the error's
-  FrameResult compared;  // without scattering, where the returned frame has it
+  std::optional<FrameSearch> search;  // while it goes on
+  std::optional<MeasureJob> measure;  // of this pass over the frame
+  MadeFrame frame;
   Clock::time_point compared_submitted;
-  double comparison_ms = 0.0;  // rendering it
-  std::optional<ErrorEstimate> error;
 
   Clock::time_point encode_begin;
   std::mutex mutex;
@@ -87,6 +92,13 @@ absl::Status FramePipeline::Submit(FrameJob job, std::stop_token stop, Done done
   flight->stop = std::move(stop);
   flight->done = std::move(done);
   flight->submitted = Clock::now();
+  if (flight->job.target.has_value()) {
+    // Whichever thread lets it begin has work of its own.
+    flight->job.target->knowledge->Enter(
+        [this, flight] { workers_.Post([this, flight] { BeginSearch(flight); }); });
+    return absl::OkStatus();
+  }
+  flight->measure = flight->job.measure;
   // The scene is needed again when the frame is described.
   absl::Status status = Render(flight, flight->job.request, &FramePipeline::OnRendered);
   if (!status.ok()) {
@@ -96,6 +108,41 @@ absl::Status FramePipeline::Submit(FrameJob job, std::stop_token stop, Done done
     idle_.notify_all();
   }
   return status;
+}
+
+void FramePipeline::BeginSearch(const FlightPtr& flight) {
+  flight->search.emplace(flight->job, costs_);
+  NextPass(flight);
+}
+
+void FramePipeline::NextPass(const FlightPtr& flight) {
+  if (flight->stop.stop_requested()) {
+    Fail(flight, absl::CancelledError("the call was cancelled"));
+    return;
+  }
+  const std::optional<FramePass> pass = flight->search->Next(flight->frame);
+  Scene& scene = flight->job.request.scene;
+  if (!pass.has_value()) {
+    const TargetOutcome& target = *flight->frame.target;
+    if (!target.returned.has_value()) {
+      Fail(flight, FieldError("target", "a scene that no technique can draw", target.reason));
+      return;
+    }
+    const Settings& settings = target.attempts[*target.returned].settings;
+    scene.shadow = settings.shadow;
+    scene.sampling = settings.sampling;
+    flight->search.reset();
+    Encode(flight);
+    return;
+  }
+  flight->measure = pass->measure;
+  if (pass->settings.has_value()) {
+    scene.shadow = pass->settings->shadow;
+    scene.sampling = pass->settings->sampling;
+    RenderWhenThereIsRoom(flight, flight->job.request, &FramePipeline::OnRendered);
+  } else {
+    measurer_.Post([this, flight] { Measure(flight); });
+  }
 }
 
 absl::Status FramePipeline::Render(const FlightPtr& flight, FrameRequest request, Stage next) {
@@ -116,53 +163,81 @@ absl::Status FramePipeline::Render(const FlightPtr& flight, FrameRequest request
   return absl::IsResourceExhausted(status) ? WithRetryHint(status) : status;
 }
 
+// For frames that were accepted: they are not lost because the queue is full when they come back.
+void FramePipeline::RenderWhenThereIsRoom(const FlightPtr& flight, FrameRequest request,
+                                          Stage next) {
+  const absl::Status status = Render(flight, request, next);
+  if (status.ok()) {
+    return;
+  }
+  if (!absl::IsResourceExhausted(status)) {
+    Fail(flight, status);
+  } else if (flight->stop.stop_requested()) {
+    Fail(flight, absl::CancelledError("the call was cancelled"));
+  } else {
+    waiter_.Post([this, flight, request = std::move(request), next] {
+      std::this_thread::sleep_for(kAskAgain);
+      RenderWhenThereIsRoom(flight, request, next);
+    });
+  }
+}
+
 void FramePipeline::OnRendered(const FlightPtr& flight, FrameResult result) {
-  flight->rendered = std::move(result);
-  const std::optional<MeasureJob>& measure = flight->job.measure;
-  if (!measure.has_value()) {
-    Encode(flight);
-    return;
-  }
-  if (measure->without_scattering) {
+  flight->frame.rendered = std::move(result);
+  if (!flight->measure.has_value()) {
+    OnMade(flight);
+  } else if (flight->measure->without_scattering) {
     flight->compared_submitted = Clock::now();
-    const absl::Status status =
-        Render(flight, WithoutScattering(flight->job.request), &FramePipeline::OnRenderedToCompare);
-    if (!status.ok()) {
-      Fail(flight, status);
-    }
-    return;
+    RenderWhenThereIsRoom(flight, WithoutScattering(flight->job.request),
+                          &FramePipeline::OnRenderedToCompare);
+  } else {
+    measurer_.Post([this, flight] { Measure(flight); });
   }
-  measurer_.Post(
-      [this, flight] { Measure(flight, flight->rendered.images[flight->job.measure->beauty]); });
 }
 
 void FramePipeline::OnRenderedToCompare(const FlightPtr& flight, FrameResult result) {
-  flight->comparison_ms =
+  flight->frame.comparison_ms =
       Milliseconds(Clock::now() - flight->compared_submitted) - QueueMilliseconds(result);
-  flight->compared = std::move(result);
-  measurer_.Post([this, flight] { Measure(flight, flight->compared.images[0]); });
+  flight->frame.other = std::move(result.images[0]);
+  measurer_.Post([this, flight] { Measure(flight); });
 }
 
-void FramePipeline::Measure(const FlightPtr& flight, const Image& beauty) {
+void FramePipeline::Measure(const FlightPtr& flight) {
+  MadeFrame& frame = flight->frame;
+  const MeasureJob& job = *flight->measure;
   absl::StatusOr<FrameError> error = absl::CancelledError("the call was cancelled");
   if (!flight->stop.stop_requested()) {
-    error = options_.measure(beauty, flight->job.request.scene, *flight->job.measure, flight->stop);
+    const Image& beauty = job.without_scattering ? *frame.other : frame.rendered.images[job.beauty];
+    error = options_.measure(beauty, flight->job.request.scene, job, flight->stop);
   }
   if (!error.ok()) {
     Fail(flight, Prefixed("measuring the error: ", error.status()));
     return;
   }
-  error->estimate.milliseconds += flight->comparison_ms;
-  flight->rendered.timings.push_back({"error", error->estimate.milliseconds});
+  frame.measurement_ms = error->estimate.milliseconds;
+  error->estimate.milliseconds +=
+      frame.error.has_value() ? frame.error->milliseconds : frame.comparison_ms;
+  frame.error = std::move(error->estimate);
   if (error->map.has_value()) {
-    flight->rendered.images.push_back(*std::move(error->map));
+    frame.rendered.images.push_back(*std::move(error->map));
   }
-  flight->error = std::move(error->estimate);
-  flight->compared = {};
-  Encode(flight);
+  OnMade(flight);
+}
+
+void FramePipeline::OnMade(const FlightPtr& flight) {
+  if (flight->search.has_value()) {
+    workers_.Post([this, flight] { NextPass(flight); });
+  } else {
+    Encode(flight);
+  }
 }
 
 void FramePipeline::Encode(const FlightPtr& flight) {
+  MadeFrame& frame = flight->frame;
+  frame.other.reset();
+  if (frame.error.has_value()) {
+    frame.rendered.timings.push_back({"error", frame.error->milliseconds});
+  }
   flight->encode_begin = Clock::now();
   const size_t outputs = flight->job.outputs.size();
   flight->encoded.resize(outputs);
@@ -177,10 +252,10 @@ void FramePipeline::EncodeOutput(const FlightPtr& flight, size_t index) {
   const OutputJob& output = flight->job.outputs[index];
   absl::StatusOr<EncodedImage> encoded = absl::CancelledError("the call was cancelled");
   if (!flight->stop.stop_requested()) {
-    encoded = options_.encode(flight->rendered.images[output.image], output.shown.kind,
+    encoded = options_.encode(flight->frame.rendered.images[output.image], output.shown.kind,
                               output.shown.quantity, output.encoding,
-                              DescribeImage(flight->job, flight->rendered, flight->error, output,
-                                            engine_.device(), options_.server_version));
+                              DescribeImage(flight->job, flight->frame, output, engine_.device(),
+                                            options_.server_version));
   }
   if (encoded.ok()) {
     flight->digests[index] = Sha256Of(encoded->bytes);
@@ -197,19 +272,23 @@ void FramePipeline::EncodeOutput(const FlightPtr& flight, size_t index) {
 }
 
 void FramePipeline::Complete(const FlightPtr& flight) {
+  flight->search.reset();  // others may wait for it
   const auto now = Clock::now();
-  std::vector<StageTiming> timings;
+  if (!flight->outcome.ok()) {
+    flight->frame = {};
+  }
+  std::vector<StageTiming>& timings = flight->frame.rendered.timings;
   if (flight->outcome.ok()) {
-    timings = std::move(flight->rendered.timings);
     timings.push_back({"encode", Milliseconds(now - flight->encode_begin)});
   }
   timings.push_back({"total", Milliseconds(now - flight->submitted)});
+  spdlog::info(FrameLogLine(flight->job, flight->frame, flight->outcome));
 
   absl::StatusOr<std::shared_ptr<const EncodedFrame>> answer = nullptr;
   if (flight->outcome.ok()) {
     auto frame = std::make_shared<EncodedFrame>();
-    frame->header = DescribeFrame(flight->job, flight->rendered, flight->error, flight->encoded,
-                                  timings, engine_.device(), options_.server_version);
+    frame->header = DescribeFrame(flight->job, flight->frame, flight->encoded, engine_.device(),
+                                  options_.server_version);
     for (size_t i = 0; i < flight->encoded.size(); ++i) {
       frame->outputs.push_back(std::move(flight->encoded[i].bytes));
       frame->trailer.add_output_sha256(flight->digests[i]);
@@ -219,9 +298,7 @@ void FramePipeline::Complete(const FlightPtr& flight) {
     answer = flight->outcome;
   }
   // Pixels go before the answer does: a slow reader shall hold the encoded bytes only.
-  flight->rendered = {};
-  flight->compared = {};
-  spdlog::info(FrameLogLine(flight->job, timings, flight->error, flight->outcome));
+  flight->frame = {};
   {
     const std::lock_guard lock(mutex_);
     --queued_;

@@ -1,6 +1,7 @@
 // A frame's way through the server: rendered on the engine's thread, its error measured where that
-// is asked for and its outputs encoded and hashed on others, and handed over complete. Does not
-// send anything and knows no clients.
+// is asked for and its outputs encoded and hashed on others, and handed over complete. A frame with
+// a target is rendered and measured as often as its search wants. Does not send anything and knows
+// no clients.
 #pragma once
 
 #include <condition_variable>
@@ -19,6 +20,8 @@
 #include "server/convert/convert_frame.h"
 #include "server/encode/encode.h"
 #include "server/frame_measurement.h"
+#include "server/frame_search.h"
+#include "server/made_frame.h"
 #include "server/worker_pool.h"
 
 namespace halflight {
@@ -57,7 +60,8 @@ class FramePipeline {
   FramePipeline(FramePipeline&&) = delete;
   FramePipeline& operator=(FramePipeline&&) = delete;
 
-  // Queues a frame; makes a request_id where the job has none. When it returns OK, `done` is called
+  // Queues a frame; makes a request_id where the job has none. One with a target begins when its
+  // knowledge lets it. When it returns OK, `done` is called
   // exactly once, on a thread of the pipeline, never of the engine: with the frame, with an error,
   // or with Cancelled soon after `stop` was requested. Frames may be done in another order than
   // they were submitted. Otherwise `done` is never called: ResourceExhausted with a retry hint when
@@ -72,10 +76,14 @@ class FramePipeline {
   absl::Status Admit();
 
   // The stages in their order. Each hands the flight on, or over to Fail, and touches it no more.
+  void BeginSearch(const FlightPtr& flight);
+  void NextPass(const FlightPtr& flight);
   absl::Status Render(const FlightPtr& flight, FrameRequest request, Stage next);
+  void RenderWhenThereIsRoom(const FlightPtr& flight, FrameRequest request, Stage next);
   void OnRendered(const FlightPtr& flight, FrameResult result);
   void OnRenderedToCompare(const FlightPtr& flight, FrameResult result);
-  void Measure(const FlightPtr& flight, const Image& beauty);
+  void Measure(const FlightPtr& flight);
+  void OnMade(const FlightPtr& flight);
   void Encode(const FlightPtr& flight);
   void EncodeOutput(const FlightPtr& flight, size_t index);
   void Complete(const FlightPtr& flight);
@@ -84,6 +92,7 @@ class FramePipeline {
 
   FrameEngine& engine_;
   const PipelineOptions options_;
+  CostModel costs_;  // of the engine's device
 
   std::mutex mutex_;
   std::condition_variable idle_;
@@ -95,6 +104,8 @@ class FramePipeline {
   // One: a measurement has all cores to itself, but for what renders and encodes meanwhile. Posts
   // to the workers, so it ends before them.
   WorkerPool measurer_{1};
+  // Waits for room in the engine's queue.
+  WorkerPool waiter_{1};
 };
 
 }  // namespace halflight

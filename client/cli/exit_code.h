@@ -14,6 +14,7 @@ enum class ExitCode : int {
   kRefused = 4,            // the server refused the request
   kServerUnavailable = 5,  // no server could be started or reached, or it did not answer in time
   kOutput = 6,             // a file could not be written
+  kTargetMissed = 7,       // --max-error or --max-time was not met; the best frame is written
   kInterrupted = 130,      // SIGINT or SIGTERM
 };
 
@@ -21,7 +22,8 @@ enum class ExitCode : int {
 inline constexpr const char* kExitCodesHelp =
     "Exit codes: 0 done; 1 fault of the server, or damaged data; 2 wrong flags or scene file;\n"
     "3 particle file missing or malformed; 4 the server refused the request; 5 no server, or no\n"
-    "answer in time; 6 a file could not be written; 130 interrupted.";
+    "answer in time; 6 a file could not be written; 7 --max-error or --max-time not met, the best\n"
+    "frame tried is written; 130 interrupted.";
 
 // The same status, to end with `code`. Cancellation stays what it is.
 absl::Status WithExitCode(absl::Status status, ExitCode code);

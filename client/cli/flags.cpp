@@ -197,6 +197,19 @@ void AddErrorFlags(CLI::App& app, RenderOptions& options) {
       ->option_text("[=SAMPLES]");
   Add(app, "--error-seed", options.error_seed, ParseSeed,
       "Chooses other random pixels for --measure-error; default: 0", "NUMBER");
+  CLI::Option* const max_error =
+      AddNumber(app, "--max-error", options.max_error, {0, 1, "a number > 0, 1 at most", false},
+                "Choose the settings: the cheapest that come this close to the image model "
+                "(relative RMSE, 0.05 is 5 %)");
+  CLI::Option* const max_time =
+      AddNumber(app, "--max-time", options.max_time_ms, kPositive,
+                "Choose the settings: the most accurate that render in so many milliseconds")
+          ->type_name("MS");
+  for (const char* settings : {"--technique", "--slices", "--plain", "--spacing", "--light-buffer",
+                               "--fit-degree", "--blur", "--blur-texels"}) {
+    max_error->excludes(app.get_option(settings));
+    max_time->excludes(app.get_option(settings));
+  }
 }
 
 }  // namespace

@@ -98,6 +98,8 @@ struct RenderOptions {
   // Its error.
   std::optional<uint32_t> error_samples;  // measure it, at so many pixels
   std::optional<uint64_t> error_seed;
+  std::optional<double> max_error;  // relative RMSE
+  std::optional<double> max_time_ms;
 
   // What is said about it.
   std::string request_id;

@@ -53,6 +53,12 @@ class FrameTaker {
       fmt::print("{}", FrameText(report, frame));
     }
     std::fflush(stdout);
+    if (frame.header.has_target() && !frame.header.target().met() && misses_++ == 0) {
+      first_miss_ = TargetMissText(frame.header.target());
+      if (job_frame.number) {
+        first_miss_ = fmt::format("frame {}: {}", *job_frame.number, first_miss_);
+      }
+    }
     taken_ = index + 1;
     progress_.Draw(taken_);
     return absl::OkStatus();
@@ -60,12 +66,27 @@ class FrameTaker {
 
   [[nodiscard]] uint64_t taken() const { return taken_; }
 
+  // Of all frames, once they are written.
+  [[nodiscard]] absl::Status TargetStatus() const {
+    if (misses_ == 0) {
+      return absl::OkStatus();
+    }
+    const std::string which =
+        taken_ == 1 ? "" : fmt::format(" by {} of {} frames, first", misses_, taken_);
+    return WithExitCode(
+        absl::FailedPreconditionError(fmt::format(
+            "the target was not met{}: {}; the best frame tried was written", which, first_miss_)),
+        ExitCode::kTargetMissed);
+  }
+
  private:
   const RenderOptions& options_;
   const RenderJob& job_;
   ProgressBar progress_;
   SteadyClock::time_point last_;
   uint64_t taken_ = 0;
+  uint64_t misses_ = 0;
+  std::string first_miss_;
 };
 
 absl::Status RenderSingle(const RenderJob& job, Client& client, FrameTaker& taker) {
@@ -145,9 +166,10 @@ absl::Status RunRender(const RenderOptions& options, const std::stop_token& stop
     return connection.status();
   }
   FrameTaker taker(options, *job);
-  return job->frames.size() > 1 || !options.frames.empty()
-             ? RenderFrames(options, *job, connection->client(), taker)
-             : RenderSingle(*job, connection->client(), taker);
+  const absl::Status status = job->frames.size() > 1 || !options.frames.empty()
+                                  ? RenderFrames(options, *job, connection->client(), taker)
+                                  : RenderSingle(*job, connection->client(), taker);
+  return status.ok() ? taker.TargetStatus() : status;
 }
 
 }  // namespace halflight::client

@@ -2,6 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <string_view>
+
+#include "absl/strings/ascii.h"
 #include "client/cli/flag_values.h"
 #include "client/cli/json.h"
 #include "halflight/sha256.h"
@@ -10,9 +14,9 @@ namespace halflight::client {
 
 namespace {
 
-double ServerMilliseconds(const v1::FrameHeader& header) {
+double StageMilliseconds(const v1::FrameHeader& header, std::string_view stage) {
   for (const v1::StageTiming& timing : header.timings()) {
-    if (timing.stage() == "total") {
+    if (timing.stage() == stage) {
       return timing.milliseconds();
     }
   }
@@ -70,7 +74,71 @@ std::string ErrorText(const v1::MeasuredError& error) {
   return text;
 }
 
+// "half-angle, 256 slices, light buffer 512".
+std::string SettingsText(const v1::TargetAttempt& attempt) {
+  constexpr std::string_view kPrefix = "SHADOW_TECHNIQUE_";
+  const v1::Shadow& shadow = attempt.shadow();
+  std::string text = v1::ShadowTechnique_Name(shadow.technique());
+  if (text.rfind(kPrefix, 0) == 0) {
+    text.erase(0, kPrefix.size());
+  }
+  std::transform(text.begin(), text.end(), text.begin(),
+                 [](unsigned char c) { return c == '_' ? '-' : absl::ascii_tolower(c); });
+  if (shadow.technique() == v1::SHADOW_TECHNIQUE_HALF_ANGLE) {
+    text +=
+        fmt::format(", {} slices, light buffer {}", shadow.slices(), shadow.light_buffer_size());
+  }
+  if (shadow.technique() == v1::SHADOW_TECHNIQUE_LIGHT_SWEEP) {
+    text += fmt::format(", degree {}, light buffer {}", shadow.fit_degree(),
+                        shadow.light_buffer_size());
+  }
+  if (attempt.sampling().downsample() > 1) {
+    text += fmt::format(", downsample {}", attempt.sampling().downsample());
+  }
+  return text;
+}
+
+// What the frame came to, of what was asked for.
+std::string ReachedText(const v1::Target& target, const v1::TargetAttempt& attempt) {
+  std::string text;
+  if (attempt.has_relative_rmse()) {
+    const v1::EstimatedFigure& error = attempt.relative_rmse();
+    text = "error " + Percent(error.value());
+    if (error.low() != error.high()) {
+      text += fmt::format(" ({} to {})", Percent(error.low()), Percent(error.high()));
+    }
+    text += target.has_max_error() ? fmt::format(" of {} asked", Percent(target.max_error())) : "";
+  }
+  if (target.has_max_time_ms()) {
+    text += fmt::format("{}{:.3g} ms of {:.3g} ms asked", text.empty() ? "" : ", ",
+                        attempt.milliseconds(), target.max_time_ms());
+  }
+  return text;
+}
+
+const v1::TargetAttempt& Returned(const v1::TargetOutcome& outcome) {
+  for (const v1::TargetAttempt& attempt : outcome.attempts()) {
+    if (attempt.returned()) {
+      return attempt;
+    }
+  }
+  return v1::TargetAttempt::default_instance();
+}
+
+std::string TargetText(const v1::FrameHeader& header) {
+  const v1::TargetOutcome& outcome = header.target();
+  const v1::TargetAttempt& returned = Returned(outcome);
+  return fmt::format("target: {}: {}: {}; {} frame{} tried in {:.0f} ms\n",
+                     outcome.met() ? "met" : "NOT MET", ReachedText(outcome.target(), returned),
+                     SettingsText(returned), outcome.attempts_size(),
+                     outcome.attempts_size() == 1 ? "" : "s", StageMilliseconds(header, "search"));
+}
+
 }  // namespace
+
+std::string TargetMissText(const v1::TargetOutcome& outcome) {
+  return fmt::format("{}: {}", ReachedText(outcome.target(), Returned(outcome)), outcome.reason());
+}
 
 std::string ChoicesText(const std::vector<Choice>& choices) {
   std::string text;
@@ -94,11 +162,14 @@ std::string FrameText(const FrameReport& report, const RenderedFrame& frame) {
     text += fmt::format(", {} bytes\n", frame.outputs[i].size());
   }
   const v1::FrameMetadata& metadata = frame.header.metadata();
-  text +=
-      fmt::format("{}{} particle{} in {:.0f} ms (server {:.0f} ms) on {}\n",
-                  report.frame ? fmt::format("frame {}: ", *report.frame) : "",
-                  metadata.particle_count(), metadata.particle_count() == 1 ? "" : "s",
-                  report.milliseconds, ServerMilliseconds(frame.header), metadata.gl_renderer());
+  text += fmt::format("{}{} particle{} in {:.0f} ms (server {:.0f} ms) on {}\n",
+                      report.frame ? fmt::format("frame {}: ", *report.frame) : "",
+                      metadata.particle_count(), metadata.particle_count() == 1 ? "" : "s",
+                      report.milliseconds, StageMilliseconds(frame.header, "total"),
+                      metadata.gl_renderer());
+  if (frame.header.has_target()) {
+    text += TargetText(frame.header);
+  }
   if (frame.header.has_error()) {
     text += ErrorText(frame.header.error());
   }
@@ -128,7 +199,7 @@ std::string FrameJson(const FrameReport& report, const RenderedFrame& frame,
   }
   json.Add("input", report.input);
   json.AddNumber("milliseconds", report.milliseconds);
-  json.AddNumber("server_milliseconds", ServerMilliseconds(frame.header));
+  json.AddNumber("server_milliseconds", StageMilliseconds(frame.header, "total"));
   json.Add("gl_renderer", frame.header.metadata().gl_renderer());
   json.AddNumber("particle_count", frame.header.metadata().particle_count());
   json.AddNumber("clamped_opacities", frame.header.metadata().clamped_opacities());
@@ -140,6 +211,9 @@ std::string FrameJson(const FrameReport& report, const RenderedFrame& frame,
   json.AddJson("timings", "[" + timings + "]");
   if (frame.header.has_error()) {
     json.AddJson("error", JsonOf(frame.header.error()));
+  }
+  if (frame.header.has_target()) {
+    json.AddJson("target", JsonOf(frame.header.target()));
   }
   return json.Text();
 }

@@ -22,9 +22,11 @@ struct FrameReport {
 };
 
 std::string ChoicesText(const std::vector<Choice>& choices);
+// Of a target that was not met: what was reached, and why not more. No full stop.
+std::string TargetMissText(const v1::TargetOutcome& outcome);
 std::string FrameText(const FrameReport& report, const RenderedFrame& frame);
 // One line, its members: frame, input, milliseconds, server_milliseconds, outputs, choices,
-// request, metadata, plan, timings; error where it was measured.
+// request, metadata, plan, timings; error where it was measured, target where there was one.
 std::string FrameJson(const FrameReport& report, const RenderedFrame& frame,
                       const v1::RenderFrameRequest& request, const std::vector<Choice>& choices);
 

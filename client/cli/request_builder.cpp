@@ -246,6 +246,25 @@ void ApplyMaterial(const RenderOptions& options, v1::Scene& scene) {
   }
 }
 
+// Settings and a target take each other's place.
+void ApplyTarget(const RenderOptions& options, v1::RenderFrameRequest& request) {
+  const bool has_settings = options.technique || options.slices || options.plain ||
+                            options.spacing || options.light_buffer_size || options.blur_mode ||
+                            options.blur_texels;
+  if (has_settings) {
+    request.clear_target();
+  }
+  if (options.max_error || options.max_time_ms) {
+    request.mutable_scene()->clear_shadow();
+  }
+  if (options.max_error) {
+    request.mutable_target()->set_max_error(*options.max_error);
+  }
+  if (options.max_time_ms) {
+    request.mutable_target()->set_max_time_ms(*options.max_time_ms);
+  }
+}
+
 void ApplyShadowAndSampling(const RenderOptions& options, v1::Scene& scene) {
   if (options.technique) {
     scene.mutable_shadow()->set_technique(*options.technique);
@@ -312,6 +331,7 @@ absl::Status ApplyFlags(const RenderOptions& options, v1::RenderFrameRequest& re
   }
   ApplyMaterial(options, scene);
   ApplyShadowAndSampling(options, scene);
+  ApplyTarget(options, request);
   if (!options.request_id.empty()) {
     request.set_request_id(options.request_id);
   }

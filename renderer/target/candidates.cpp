@@ -164,7 +164,7 @@ void ListReference(const Scene& scene, const SceneFeatures& features,
       return refuse("an output shows a light buffer, which REFERENCE has not");
     }
   }
-  const double work = ReferenceWork(scene);
+  const double work = ReferenceWork(scene, features.pixels);
   if (work > limits.max_reference_work) {
     return refuse(absl::StrCat("REFERENCE would need ", work,
                                " samples times particles; the limit is ",

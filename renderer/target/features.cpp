@@ -132,11 +132,9 @@ SceneFeatures FeaturesOf(const Scene& scene) {
   return features;
 }
 
-double ReferenceWork(const Scene& scene) {
+double ReferenceWork(const Scene& scene, double pixels) {
   constexpr double kLeastSamples = 65536.0;
-  const PixelRect& window = scene.camera.window;
-  const double samples =
-      1.0 * window.width * window.height * scene.sampling.supersample * scene.sampling.supersample;
+  const double samples = pixels * scene.sampling.supersample * scene.sampling.supersample;
   return std::max(kLeastSamples, samples) * static_cast<double>(scene.particles->size());
 }
 

@@ -35,7 +35,9 @@ struct SceneFeatures {
 // particles.
 SceneFeatures FeaturesOf(const Scene& scene);
 
-// Samples times particles, in the sense of ServerLimits.max_reference_work.
-double ReferenceWork(const Scene& scene);
+// Samples times particles, in the sense of ServerLimits.max_reference_work, of evaluating the image
+// model at so many pixels: it takes time in proportion to what it samples and to what each sample
+// may meet; and however few samples there are, memory in proportion to the particles.
+double ReferenceWork(const Scene& scene, double pixels);
 
 }  // namespace halflight

@@ -218,7 +218,8 @@ std::optional<size_t> TargetSearch::BestOf(size_t attempts) const {
 
 bool TargetSearch::Needs(size_t attempt) const {
   if (attempt >= attempts_.size()) return false;
-  if (done_) return attempt == BestOf(attempts_.size());
+  const bool is_over = done_ || (pending_ && pending_->action == TargetAction::kRender);
+  if (is_over) return attempt == BestOf(attempts_.size());
   // Measured again, the last one may turn out worse than the best before it.
   return attempt + 1 == attempts_.size() || attempt == BestOf(attempts_.size() - 1);
 }

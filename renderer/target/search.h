@@ -82,7 +82,7 @@ class TargetSearch {
   void Observe(const TargetObservation& observation);
 
   // Whether the frame of an attempt, counted from 0, may still be measured or returned: that of two
-  // at most.
+  // at most, of one once Next said to render another.
   [[nodiscard]] bool Needs(size_t attempt) const;
 
   // Valid after Next returned none.

@@ -65,12 +65,24 @@ absl::StatusOr<FrameJob> ConvertFrame(const v1::RenderFrameRequest& request,
   FrameJob job;
   job.request_id = request.request_id();
   job.particle_sha256 = particles.sha256;
+  if (request.has_target()) {
+    CheckTarget(request, checks);
+  }
   job.request.scene = ConvertScene(request.scene(), particles.set, limits, checks);
+  if (checks.ok() && !request.has_target()) {
+    CheckTechnique(job.request.scene, limits, checks);
+  }
   if (checks.ok()) {
     const Scene& scene = job.request.scene;
     OutputPlan plan = ConvertOutputs(request.outputs(), scene, limits, checks);
     if (checks.ok()) {
       job.measure = ConvertMeasurement(request, scene, limits, plan, checks);
+    }
+    if (checks.ok() && request.has_target()) {
+      const bool sampled = job.measure.has_value() && job.measure->sample.has_value();
+      job.target = ConvertTarget(request, scene,
+                                 (sampled ? *job.measure->sample : ErrorEstimateOptions{}).samples,
+                                 limits, plan);
     }
     job.request.images = std::move(plan.images);
     job.outputs = std::move(plan.outputs);

@@ -11,6 +11,7 @@
 #include "renderer/frame.h"
 #include "server/convert/convert_measurement.h"
 #include "server/convert/convert_outputs.h"
+#include "server/convert/convert_target.h"
 #include "server/limits.h"
 #include "server/particle_assembler.h"
 #include "server/particle_store.h"
@@ -24,6 +25,8 @@ struct FrameJob {
   FrameRequest request;
   std::vector<OutputJob> outputs;
   std::optional<MeasureJob> measure;
+  // Where it is set, the request's shadow and sampling are where its choice starts from.
+  std::optional<TargetJob> target;
   uint64_t pixel_bytes = 0;  // of all outputs together, in 32-bit float, at most
 };
 

@@ -31,6 +31,8 @@ std::optional<MeasureJob> ConvertMeasurement(const v1::RenderFrameRequest& reque
   job.without_scattering = scene.scatters();
   if (request.has_measure_error()) {
     job.sample = ConvertSample(request.measure_error(), checks);
+  } else if (request.target().has_max_error()) {
+    job.sample = ConvertSample({}, checks);
   }
   const auto map = std::find_if(plan.outputs.begin(), plan.outputs.end(), ShowsError);
   job.map = map != plan.outputs.end();
@@ -51,9 +53,9 @@ std::optional<MeasureJob> ConvertMeasurement(const v1::RenderFrameRequest& reque
     CheckReferenceWork(fmt::format("outputs[{}].kind", map - plan.outputs.begin()),
                        "OUTPUT_KIND_ERROR", pixels, scene, limits, checks);
   } else {
-    CheckReferenceWork("measure_error", "a measurement",
-                       std::min(pixels, static_cast<double>(job.sample->samples)), scene, limits,
-                       checks);
+    CheckReferenceWork(request.has_measure_error() ? "measure_error" : "target.max_error",
+                       "a measurement", std::min(pixels, static_cast<double>(job.sample->samples)),
+                       scene, limits, checks);
   }
   return job;
 }

@@ -1,5 +1,5 @@
-// What is to be measured of a frame, from the request's measure_error and its outputs of the error,
-// with every check of it. Measures nothing.
+// What is to be measured of a frame, from the request's measure_error, its outputs of the error and
+// the error that its target allows, with every check of it. Measures nothing.
 #pragma once
 
 #include <cstddef>
@@ -15,8 +15,9 @@
 namespace halflight {
 
 struct MeasureJob {
-  std::optional<ErrorEstimateOptions> sample;  // as asked for; none where only a map is
-  bool map = false;                            // an output shows the error at every pixel
+  // As asked for; with a target of an error, to begin with. None where only a map is.
+  std::optional<ErrorEstimateOptions> sample;
+  bool map = false;  // an output shows the error at every pixel
   // Whether the frame that is compared is another one: the same without scattering.
   bool without_scattering = false;
   size_t beauty = 0;  // else which of the frame's images is compared
@@ -24,8 +25,8 @@ struct MeasureJob {
 
 // None where nothing is asked for. Completes `plan`: adds the beauty where it is compared and no
 // output shows it, and gives outputs of the error their image, which comes after all that are
-// rendered. The scene and the plan have passed their checks. Field paths start with "measure_error"
-// or "outputs".
+// rendered. The scene and the plan have passed their checks. Field paths start with
+// "measure_error", "target" or "outputs".
 std::optional<MeasureJob> ConvertMeasurement(const v1::RenderFrameRequest& request,
                                              const Scene& scene, const ServerLimits& limits,
                                              OutputPlan& plan, FieldChecks& checks);

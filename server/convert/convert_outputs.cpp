@@ -74,8 +74,7 @@ OutputJob ConvertOutput(const v1::Output& output, const Scene& scene, const std:
   return job;
 }
 
-// An upper bound: the renderer may find that fewer slices or channels do.
-uint64_t PixelBytes(const ImageRequest& shown, const Scene& scene) {
+uint64_t PixelBytesOf(const ImageRequest& shown, const Scene& scene) {
   uint64_t channels = shown.kind == ImageKind::kBeauty ? 4 : 1;
   if (shown.kind == ImageKind::kError ||
       (ShowsLight(shown.kind) && scene.lights[shown.light_index].colored_density())) {
@@ -122,14 +121,22 @@ OutputPlan ConvertOutputs(const google::protobuf::RepeatedPtrField<v1::Output>& 
     if (job.shown.kind != ImageKind::kError) {
       job.image = IndexOfImage(plan.images, job.shown);
     }
-    plan.pixel_bytes += PixelBytes(job.shown, scene);
     plan.outputs.push_back(job);
   }
+  plan.pixel_bytes = checks.ok() ? PixelBytes(plan.outputs, scene) : 0;
   if (plan.pixel_bytes > limits.max_output_bytes) {
     checks.Reject("outputs", fmt::format("{} bytes of pixels in 32-bit float", plan.pixel_bytes),
                   fmt::format("at most {}", limits.max_output_bytes));
   }
   return plan;
+}
+
+uint64_t PixelBytes(const std::vector<OutputJob>& outputs, const Scene& scene) {
+  uint64_t bytes = 0;
+  for (const OutputJob& output : outputs) {
+    bytes += PixelBytesOf(output.shown, scene);
+  }
+  return bytes;
 }
 
 v1::Output DescribeOutput(const OutputJob& job) {

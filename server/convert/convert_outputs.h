@@ -42,6 +42,10 @@ size_t IndexOfImage(std::vector<ImageRequest>& images, const ImageRequest& wante
 // Whether the image shows a light's view of the particles, not the camera's.
 bool IsSeenFromLight(ImageKind kind);
 
+// Of all outputs together, in 32-bit float. An upper bound: the renderer may find that fewer slices
+// or channels do.
+uint64_t PixelBytes(const std::vector<OutputJob>& outputs, const Scene& scene);
+
 // The other way.
 v1::Output DescribeOutput(const OutputJob& job);
 

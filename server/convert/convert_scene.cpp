@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 #include <glm/geometric.hpp>
 
+#include "renderer/target/features.h"
 #include "server/convert/convert_camera.h"
 #include "server/convert/enums.h"
 #include "server/convert/geometry.h"
@@ -236,28 +237,28 @@ Scene ConvertScene(const v1::Scene& scene, std::shared_ptr<const ParticleSet> pa
   if (converted.time_offset_s != 0.0) {
     CheckMoved(*converted.particles, converted.time_offset_s, checks);
   }
-  if (checks.ok() && converted.shadow.technique != ShadowTechniqueKind::kReference) {
-    CheckPointLights(converted, checks);
-  }
-  if (checks.ok() && converted.shadow.technique == ShadowTechniqueKind::kReference) {
-    CheckReferenceWork(
-        "scene.shadow.technique", "SHADOW_TECHNIQUE_REFERENCE",
-        static_cast<double>(converted.camera.window.width) * converted.camera.window.height,
-        converted, limits, checks);
-  }
   return converted;
+}
+
+void CheckTechnique(const Scene& scene, const ServerLimits& limits, FieldChecks& checks) {
+  if (scene.shadow.technique != ShadowTechniqueKind::kReference) {
+    CheckPointLights(scene, checks);
+  } else {
+    CheckReferenceWork("scene.shadow.technique", "SHADOW_TECHNIQUE_REFERENCE",
+                       static_cast<double>(scene.camera.window.width) * scene.camera.window.height,
+                       scene, limits, checks);
+  }
 }
 
 void CheckReferenceWork(const std::string& field, const std::string& what, double pixels,
                         const Scene& scene, const ServerLimits& limits, FieldChecks& checks) {
-  constexpr double kLeastSamples = 65536.0;
-  const double samples =
-      std::max(kLeastSamples, pixels * scene.sampling.supersample * scene.sampling.supersample);
-  const auto particles = static_cast<double>(scene.particles->size());
-  if (samples * particles > static_cast<double>(limits.max_reference_work)) {
-    checks.Reject(field,
-                  fmt::format("{} of {} samples times {} particles", what, samples, particles),
-                  fmt::format("a product of at most {}", limits.max_reference_work));
+  const double work = ReferenceWork(scene, pixels);
+  if (work > static_cast<double>(limits.max_reference_work)) {
+    const auto particles = static_cast<double>(scene.particles->size());
+    checks.Reject(
+        field,
+        fmt::format("{} of {} samples times {} particles", what, work / particles, particles),
+        fmt::format("a product of at most {}", limits.max_reference_work));
   }
 }
 

@@ -13,13 +13,16 @@
 namespace halflight {
 
 // Defaults filled in. The result is only meaningful when the checks are passed; field paths start
-// with "scene". `particles` are what the message's `particles` stand for.
+// with "scene". `particles` are what the message's `particles` stand for. Whether the technique can
+// draw it stands in CheckTechnique.
 Scene ConvertScene(const v1::Scene& scene, std::shared_ptr<const ParticleSet> particles,
                    const ServerLimits& limits, FieldChecks& checks);
 
-// The reference takes time in proportion to what it samples, and to what each sample may meet; and
-// however few samples there are, memory in proportion to the particles. Rejects `field` where the
-// model of so many `pixels` of the scene goes beyond the limit on both; `what` asks for it.
+// What the technique that the scene names needs of it. The scene has passed its checks.
+void CheckTechnique(const Scene& scene, const ServerLimits& limits, FieldChecks& checks);
+
+// Rejects `field` where evaluating the image model at so many `pixels` of the scene goes beyond the
+// limit on it (ReferenceWork); `what` asks for it.
 void CheckReferenceWork(const std::string& field, const std::string& what, double pixels,
                         const Scene& scene, const ServerLimits& limits, FieldChecks& checks);
 

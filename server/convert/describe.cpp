@@ -106,6 +106,49 @@ void AddErrorText(const MeasureJob& measure, const ErrorEstimate& error, ImageMe
   add("compared", v1::ComparedFrame_Name(DescribeCompared(measure)));
 }
 
+v1::Sampling DescribeSampling(const Sampling& sampling) {
+  v1::Sampling described;
+  if (sampling.downsample > 1) {
+    described.set_downsample(static_cast<uint32_t>(sampling.downsample));
+  } else {
+    described.set_supersample(static_cast<uint32_t>(sampling.supersample));
+  }
+  return described;
+}
+
+v1::TargetOutcome DescribeOutcome(const TargetGoal& goal, const TargetOutcome& outcome) {
+  v1::TargetOutcome described;
+  *described.mutable_target() = DescribeTarget(goal);
+  described.set_met(outcome.met);
+  described.set_reason(outcome.reason);
+  for (const TargetAttempt& attempt : outcome.attempts) {
+    v1::TargetAttempt& tried = *described.add_attempts();
+    *tried.mutable_shadow() = DescribeShadow(attempt.settings.shadow);
+    *tried.mutable_sampling() = DescribeSampling(attempt.settings.sampling);
+    tried.set_expected_milliseconds(attempt.expected_milliseconds);
+    tried.set_milliseconds(attempt.milliseconds);
+    if (attempt.relative_rmse.has_value()) {
+      Fill(*tried.mutable_relative_rmse(), *attempt.relative_rmse);
+    }
+    tried.set_met(attempt.met);
+  }
+  if (outcome.returned.has_value()) {
+    described.mutable_attempts(static_cast<int>(*outcome.returned))->set_returned(true);
+  }
+  return described;
+}
+
+void AddTargetText(const TargetGoal& goal, const TargetOutcome& outcome, ImageMetadata& metadata) {
+  metadata.text.emplace_back("halflight:target.met", outcome.met ? "true" : "false");
+  if (goal.max_error.has_value()) {
+    metadata.text.emplace_back("halflight:target.maxError", fmt::format("{:.6g}", *goal.max_error));
+  }
+  if (goal.max_time_ms.has_value()) {
+    metadata.text.emplace_back("halflight:target.maxTimeMs",
+                               fmt::format("{:.6g}", *goal.max_time_ms));
+  }
+}
+
 v1::OutputInfo DescribeEncoded(const OutputJob& output, const Image& image,
                                const EncodedImage& encoded) {
   v1::OutputInfo info;
@@ -127,8 +170,7 @@ v1::OutputInfo DescribeEncoded(const OutputJob& output, const Image& image,
 
 }  // namespace
 
-ImageMetadata DescribeImage(const FrameJob& job, const FrameResult& result,
-                            const std::optional<ErrorEstimate>& error, const OutputJob& output,
+ImageMetadata DescribeImage(const FrameJob& job, const MadeFrame& frame, const OutputJob& output,
                             const DeviceInfo& device, const std::string& server_version) {
   const Scene& scene = job.request.scene;
   const v1::Shadow shadow = DescribeShadow(scene.shadow);
@@ -148,18 +190,22 @@ ImageMetadata DescribeImage(const FrameJob& job, const FrameResult& result,
       {"halflight:renderer", device.gl_renderer},
       {"halflight:version", server_version},
   };
+  if (job.target.has_value() && frame.target.has_value()) {
+    AddTargetText(job.target->goal, *frame.target, metadata);
+  }
   if (IsSeenFromLight(output.shown.kind)) {
+    const std::vector<LightReport>& lights = frame.rendered.lights;
     const auto index = static_cast<size_t>(output.shown.light_index);
     metadata.text.emplace_back("halflight:light", fmt::format("{}", index));
     metadata.text.emplace_back("halflight:quantity", v1::LightQuantity_Name(described.quantity()));
-    if (index < result.lights.size()) {
-      metadata.world_to_camera = result.lights[index].light_view_from_world;
-      metadata.world_to_ndc = result.lights[index].light_texture_from_world;
+    if (index < lights.size()) {
+      metadata.world_to_camera = lights[index].light_view_from_world;
+      metadata.world_to_ndc = lights[index].light_texture_from_world;
     }
     return metadata;
   }
-  if (job.measure.has_value() && error.has_value()) {
-    AddErrorText(*job.measure, *error, metadata);
+  if (job.measure.has_value() && frame.error.has_value()) {
+    AddErrorText(*job.measure, *frame.error, metadata);
   }
   metadata.world_to_camera = scene.camera.view_from_world;
   metadata.world_to_ndc = NdcFromWorld(scene.camera);
@@ -168,11 +214,10 @@ ImageMetadata DescribeImage(const FrameJob& job, const FrameResult& result,
   return metadata;
 }
 
-v1::FrameHeader DescribeFrame(const FrameJob& job, const FrameResult& result,
-                              const std::optional<ErrorEstimate>& error,
-                              const std::vector<EncodedImage>& encoded,
-                              const std::vector<StageTiming>& timings, const DeviceInfo& device,
+v1::FrameHeader DescribeFrame(const FrameJob& job, const MadeFrame& frame,
+                              const std::vector<EncodedImage>& encoded, const DeviceInfo& device,
                               const std::string& server_version) {
+  const FrameResult& result = frame.rendered;
   v1::FrameHeader header;
   *header.mutable_metadata() = DescribeMetadata(job, result, device, server_version);
   for (const PlannedPass& pass : result.plan.passes) {
@@ -181,13 +226,16 @@ v1::FrameHeader DescribeFrame(const FrameJob& job, const FrameResult& result,
     planned.set_reason(pass.reason);
     planned.set_count(pass.count);
   }
-  for (const StageTiming& timing : timings) {
+  for (const StageTiming& timing : result.timings) {
     v1::StageTiming& stage = *header.add_timings();
     stage.set_stage(timing.stage);
     stage.set_milliseconds(timing.milliseconds);
   }
-  if (job.measure.has_value() && error.has_value()) {
-    *header.mutable_error() = DescribeError(*job.measure, *error);
+  if (job.measure.has_value() && frame.error.has_value()) {
+    *header.mutable_error() = DescribeError(*job.measure, *frame.error);
+  }
+  if (job.target.has_value() && frame.target.has_value()) {
+    *header.mutable_target() = DescribeOutcome(job.target->goal, *frame.target);
   }
   for (size_t i = 0; i < encoded.size(); ++i) {
     const OutputJob& output = job.outputs[i];

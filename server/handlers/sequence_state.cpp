@@ -40,8 +40,22 @@ absl::StatusOr<FrameJob> SequenceState::Next(const v1::RenderFrameRequest& reque
   if (request.has_measure_error()) {
     *merged_.mutable_measure_error() = request.measure_error();
   }
+  // Settings and a target end each other.
+  if (scene.has_shadow()) {
+    merged_.clear_target();
+  }
+  if (request.has_target()) {
+    *merged_.mutable_target() = request.target();
+    if (!scene.has_shadow()) {
+      merged.clear_shadow();
+    }
+  }
   merged_.set_request_id(request.request_id());
-  return ConvertFrame(merged_, *particles_, backend.limits);
+  auto job = ConvertFrame(merged_, *particles_, backend.limits);
+  if (job.ok() && job->target.has_value()) {
+    job->target->knowledge = knowledge_;
+  }
+  return job;
 }
 
 }  // namespace halflight

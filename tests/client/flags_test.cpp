@@ -179,6 +179,32 @@ TEST(RenderFlags, MeasureTheErrorWithAValueBehindTheSignOfEqualityAlone) {
              R"({"scene": {"camera": {}}, "measure_error": {"samples": 64, "seed": "2"}})");
 }
 
+TEST(RenderFlags, TargetAndSettingsTakeEachOthersPlace) {
+  ExpectJson(RequestOf({"in.ply", "--max-error", "0.05", "--max-time", "40"}),
+             R"({"scene": {"camera": {}}, "target": {"max_error": 0.05, "max_time_ms": 40}})");
+  const auto settings = ParseRequestJson(R"({"scene": {"shadow": {"slices": 7}}})");
+  ASSERT_TRUE(settings.ok());
+  ExpectJson(RequestOf({"--max-error", "1"}, *settings),
+             R"({"scene": {"camera": {}}, "target": {"max_error": 1}})");
+  const auto target = ParseRequestJson(R"({"target": {"max_error": 0.05}})");
+  ASSERT_TRUE(target.ok());
+  ExpectJson(RequestOf({"--slices", "7"}, *target),
+             R"({"scene": {"camera": {}, "shadow": {"slices": 7}}})");
+  ExpectJson(RequestOf({"--max-time", "40"}, *target),
+             R"({"scene": {"camera": {}}, "target": {"max_error": 0.05, "max_time_ms": 40}})");
+  ExpectJson(
+      RequestOf({"--size", "10x10"}, *target),
+      R"({"scene": {"camera": {"width": 10, "height": 10}}, "target": {"max_error": 0.05}})");
+  for (const char* flag : {"--technique=reference", "--slices=7", "--plain", "--spacing=count",
+                           "--light-buffer=64", "--blur=distance", "--blur-texels=2"}) {
+    const std::string name = std::string(flag).substr(0, std::string(flag).find('='));
+    EXPECT_THAT(ErrorOf({flag, "--max-error", "0.05"}),
+                testing::AllOf(HasSubstr(name), HasSubstr("--max-error")));
+    EXPECT_THAT(ErrorOf({flag, "--max-time", "5"}),
+                testing::AllOf(HasSubstr(name), HasSubstr("--max-time")));
+  }
+}
+
 TEST(RenderFlags, StoreTheErrorInFloats) {
   ExpectJson(RequestOf({"-o", "error=e.exr", "-o", "error=e.png"}),
              R"({"scene": {"camera": {}}, "outputs": [
@@ -278,6 +304,9 @@ TEST(RenderFlags, NameTheFlagTheValueAndWhatIsAllowed) {
            Case{{"--measure-error=few"}, {"--measure-error", "'few'"}},
            Case{{"--measure-error", "--error-seed", "-1"}, {"--error-seed", "'-1'"}},
            Case{{"--error-seed", "1"}, {"--error-seed", "--measure-error"}},
+           Case{{"--max-error", "0"}, {"--max-error", "'0'", "> 0, 1 at most"}},
+           Case{{"--max-error", "5"}, {"--max-error", "'5'"}},
+           Case{{"--max-time", "-1"}, {"--max-time", "'-1'"}},
            Case{{"--no-such-flag"}, {"--no-such-flag"}},
        }) {
     const std::string error = ErrorOf(bad.words);

@@ -64,6 +64,44 @@ TEST(FrameText, OfAnEmptyFrameSaysThatThereIsNothingToMeasure) {
   EXPECT_THAT(FrameText({}, frame), HasSubstr("error: none to measure, since no pixel is covered"));
 }
 
+RenderedFrame TargetFrame() {
+  RenderedFrame frame;
+  v1::TargetOutcome& outcome = *frame.header.mutable_target();
+  outcome.mutable_target()->set_max_error(0.05);
+  outcome.set_met(true);
+  outcome.add_attempts();
+  v1::TargetAttempt& attempt = *outcome.add_attempts();
+  attempt.mutable_shadow()->set_technique(v1::SHADOW_TECHNIQUE_HALF_ANGLE);
+  attempt.mutable_shadow()->set_slices(256);
+  attempt.mutable_shadow()->set_light_buffer_size(512);
+  attempt.mutable_relative_rmse()->set_value(0.043);
+  attempt.mutable_relative_rmse()->set_low(0.0402);
+  attempt.mutable_relative_rmse()->set_high(0.046);
+  attempt.set_milliseconds(212);
+  attempt.set_met(true);
+  attempt.set_returned(true);
+  v1::StageTiming& search = *frame.header.add_timings();
+  search.set_stage("search");
+  search.set_milliseconds(812);
+  return frame;
+}
+
+TEST(FrameText, TellsWhatMetTheTargetAndWhatItTook) {
+  RenderedFrame frame = TargetFrame();
+  EXPECT_THAT(FrameText({}, frame),
+              HasSubstr("target: met: error 4.3 % (4.02 % to 4.6 %) of 5 % asked: half-angle, 256 "
+                        "slices, light buffer 512; 2 frames tried in 812 ms\n"));
+  v1::TargetOutcome& outcome = *frame.header.mutable_target();
+  outcome.mutable_target()->set_max_time_ms(100);
+  outcome.set_met(false);
+  outcome.set_reason("all others are slower");
+  EXPECT_THAT(FrameText({}, frame), HasSubstr("target: NOT MET: error 4.3 % (4.02 % to 4.6 %) of "
+                                              "5 % asked, 212 ms of 100 ms asked: half-angle"));
+  EXPECT_EQ(TargetMissText(outcome),
+            "error 4.3 % (4.02 % to 4.6 %) of 5 % asked, 212 ms of 100 ms asked: all others are "
+            "slower");
+}
+
 TEST(FrameJson, HasTheErrorAsTheServerTellsIt) {
   const RenderedFrame frame = MeasuredFrame();
   const std::string json = FrameJson({}, frame, {}, {});

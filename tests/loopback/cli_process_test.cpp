@@ -100,6 +100,27 @@ TEST(Cli, StatesTheErrorAndShowsWhereItIs) {
   EXPECT_EQ(LargestValue(folder / "e.png", "png"), 1.0F);
 }
 
+TEST(Cli, TargetThatIsMissedHasItsOwnExitCodeAndTheFrame) {
+  const Folder folder;
+  const Ended met = RunHalflight(folder, {"render", PlumePath("0024"), "--size", "80x60",
+                                          "--max-error", "0.05", "-o", folder / "met.exr"});
+  EXPECT_EQ(met.code, 0) << met.err;
+  EXPECT_EQ(met.err, "");
+  EXPECT_THAT(met.out, HasSubstr("target: met: error "));
+  EXPECT_THAT(met.out, HasSubstr(" of 5 % asked: "));
+  EXPECT_EQ(Decode(Contents(folder / "met.exr"), "exr").at(0).texts.at("halflight:target.met"),
+            "true");
+  const Ended missed =
+      RunHalflight(folder, {"render", PlumePath("0024"), "--size", "80x60", "--max-time", "0.01",
+                            "--json", "-o", folder / "missed.exr"});
+  EXPECT_EQ(missed.code, 7) << missed.err;
+  EXPECT_THAT(missed.err, HasSubstr("the target was not met: "));
+  EXPECT_THAT(missed.err, HasSubstr("of 0.01 ms asked: "));
+  EXPECT_THAT(missed.out, HasSubstr("\"attempts\""));
+  EXPECT_THAT(missed.out, HasSubstr("\"exit_code\":7"));
+  EXPECT_EQ(Decode(Contents(folder / "missed.exr"), "exr").at(0).width, 80);
+}
+
 TEST(Cli, PrintedSceneGivesTheSameBytesAgain) {
   const Folder folder;
   const std::vector<std::string> flags =

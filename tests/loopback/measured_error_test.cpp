@@ -9,62 +9,11 @@
 
 #include "tests/encode/decoded.h"
 #include "tests/loopback/test_server.h"
-#include "tests/loopback/wire_scene.h"
-#include "tests/oracle/plume.h"
+#include "tests/loopback/true_error.h"
 #include "tests/renderer/test_scene.h"
 
 namespace halflight::loopback {
 namespace {
-
-Scene Plume() {
-  Scene scene;
-  scene.particles = oracle::LoadPlume(std::string(HALFLIGHT_TEST_DATA) + "/plume/plume.0040.ply");
-  scene.camera = test::LookAt({0.5, 1.5, 4.6}, {0, 1.25, 0}, 160, 120);
-  scene.lights = {test::Sun({1, -0.6, -0.6})};
-  scene.material.radius = 0.045F;
-  scene.shadow.slices = 64;
-  scene.shadow.light_buffer_size = 256;
-  return scene;
-}
-
-// Asks for raw floats of these, without sending the particles.
-v1::RenderFrameRequest RequestOf(const Scene& scene, const std::vector<v1::OutputKind>& kinds) {
-  v1::RenderFrameRequest request = RequestWithoutParticles(scene);
-  for (const v1::OutputKind kind : kinds) {
-    *request.add_outputs() = OutputOf(kind);
-  }
-  return request;
-}
-
-// The truth, from a beauty and its error at every pixel.
-struct Truth {
-  double mse = 0.0;
-  double bias = 0.0;
-  double relative_rmse = 0.0;
-  double max = 0.0;
-  uint64_t covered = 0;
-
-  Truth(const std::vector<float>& beauty, const std::vector<float>& error) {
-    double reference = 0.0;
-    for (size_t i = 0; i < error.size() / 3; ++i) {
-      if (!(beauty.at(4 * i + 3) > 0.01F)) {
-        continue;
-      }
-      ++covered;
-      for (size_t c = 0; c < 3; ++c) {
-        const double off = error[3 * i + c];
-        mse += off * off;
-        bias += off;
-        reference += static_cast<double>(beauty[4 * i + c]) - off;
-        max = std::max(max, std::abs(off));
-      }
-    }
-    const double count = 3.0 * static_cast<double>(covered);
-    mse /= count;
-    bias /= count;
-    relative_rmse = std::sqrt(mse) / (reference / count);
-  }
-};
 
 class MeasuredError : public ::testing::Test {
  protected:
@@ -85,7 +34,7 @@ TEST_F(MeasuredError, IntervalsOfThePlumeHoldTheTrueOne) {
   const Scene scene = Plume();
   ASSERT_NE(scene.particles, nullptr);
   const auto whole =
-      Render(RequestOf(scene, {v1::OUTPUT_KIND_BEAUTY, v1::OUTPUT_KIND_ERROR}), scene);
+      Render(RequestFor(scene, {v1::OUTPUT_KIND_BEAUTY, v1::OUTPUT_KIND_ERROR}), scene);
   const std::vector<float> beauty = FloatsOf(whole.outputs[0]);
   const Truth truth(beauty, FloatsOf(whole.outputs[1]));
   ASSERT_GT(truth.covered, 2000U);
@@ -96,7 +45,7 @@ TEST_F(MeasuredError, IntervalsOfThePlumeHoldTheTrueOne) {
   // Of a hundred intervals five miss: three of eight do once in two hundred times.
   constexpr uint64_t kSeeds = 8;
   constexpr int kLeastHolding = 6;
-  v1::RenderFrameRequest request = RequestOf(scene, {v1::OUTPUT_KIND_BEAUTY});
+  v1::RenderFrameRequest request = RequestFor(scene, {v1::OUTPUT_KIND_BEAUTY});
   int holding[4] = {};
   for (uint64_t seed = 1; seed <= kSeeds; ++seed) {
     request.mutable_measure_error()->set_seed(seed);
@@ -129,7 +78,7 @@ TEST_F(MeasuredError, IntervalsOfThePlumeHoldTheTrueOne) {
 TEST_F(MeasuredError, OfTheReferenceIsRoundingAlone) {
   Scene scene = test::BallScene(300, 48);
   v1::RenderFrameRequest request =
-      RequestOf(scene, {v1::OUTPUT_KIND_BEAUTY, v1::OUTPUT_KIND_ERROR});
+      RequestFor(scene, {v1::OUTPUT_KIND_BEAUTY, v1::OUTPUT_KIND_ERROR});
   request.mutable_scene()->mutable_shadow()->set_technique(v1::SHADOW_TECHNIQUE_REFERENCE);
   const auto map = Render(request, scene);
   for (const float off : FloatsOf(map.outputs[1])) {
@@ -146,7 +95,7 @@ TEST_F(MeasuredError, OfTheReferenceIsRoundingAlone) {
 TEST_F(MeasuredError, OfAnEmptyImageIsZero) {
   Scene scene = test::BallScene(300, 48);
   scene.camera = test::LookAt({0, 0, 4}, {0, 0, 8}, 48, 48);
-  v1::RenderFrameRequest request = RequestOf(scene, {v1::OUTPUT_KIND_BEAUTY});
+  v1::RenderFrameRequest request = RequestFor(scene, {v1::OUTPUT_KIND_BEAUTY});
   request.mutable_measure_error();
   for (const bool map : {false, true}) {
     if (map) {
@@ -163,11 +112,11 @@ TEST_F(MeasuredError, OfAnEmptyImageIsZero) {
 
 TEST_F(MeasuredError, OfScatteringIsThatOfTheFrameWithout) {
   Scene scene = test::BallScene(300, 48);
-  v1::RenderFrameRequest plain = RequestOf(scene, {v1::OUTPUT_KIND_BEAUTY, v1::OUTPUT_KIND_ERROR});
+  v1::RenderFrameRequest plain = RequestFor(scene, {v1::OUTPUT_KIND_BEAUTY, v1::OUTPUT_KIND_ERROR});
   const auto without = Render(plain, scene);
   scene.material.scattering_spread = 0.3F;
   const auto with =
-      Render(RequestOf(scene, {v1::OUTPUT_KIND_BEAUTY, v1::OUTPUT_KIND_ERROR}), scene);
+      Render(RequestFor(scene, {v1::OUTPUT_KIND_BEAUTY, v1::OUTPUT_KIND_ERROR}), scene);
   EXPECT_NE(with.outputs[0], without.outputs[0]);
   EXPECT_EQ(with.outputs[1], without.outputs[1]);
   EXPECT_EQ(with.header.error().compared(), v1::COMPARED_FRAME_WITHOUT_SCATTERING);
@@ -177,7 +126,7 @@ TEST_F(MeasuredError, OfScatteringIsThatOfTheFrameWithout) {
 
 TEST_F(MeasuredError, CountsWhatDownsamplingLoses) {
   Scene scene = test::BallScene(300, 48);
-  v1::RenderFrameRequest request = RequestOf(scene, {v1::OUTPUT_KIND_BEAUTY});
+  v1::RenderFrameRequest request = RequestFor(scene, {v1::OUTPUT_KIND_BEAUTY});
   request.mutable_measure_error();
   const double full = Render(request, scene).header.error().relative_rmse().value();
   request.mutable_scene()->mutable_sampling()->set_downsample(4);
@@ -189,7 +138,7 @@ TEST_F(MeasuredError, CountsWhatDownsamplingLoses) {
 TEST_F(MeasuredError, IsInTheFilesAndPlacedInTheCrop) {
   Scene scene = test::BallScene(300, 64);
   scene.camera.window = {16, 24, 32, 20};
-  v1::RenderFrameRequest request = RequestOf(scene, {v1::OUTPUT_KIND_ERROR});
+  v1::RenderFrameRequest request = RequestFor(scene, {v1::OUTPUT_KIND_ERROR});
   request.clear_outputs();
   *request.add_outputs() = OutputOf(v1::OUTPUT_KIND_BEAUTY, v1::IMAGE_FORMAT_EXR_HALF);
   *request.add_outputs() = OutputOf(v1::OUTPUT_KIND_BEAUTY, v1::IMAGE_FORMAT_PNG8);

@@ -116,11 +116,12 @@ TEST(ConvertMeasurement, AndBackTellsTheErrorAndWhatWasCompared) {
   error.sample_max = 7.0;
   error.sample_worst = {{.pixel = {3, 4}, .error = {7.0, -1.0, 0.5}, .largest = 7.0}};
   error.milliseconds = 12.0;
-  FrameResult result;
-  result.images = {FakeImage(job.request.scene, job.request.images[0], 0)};
-  const v1::FrameHeader header = DescribeFrame(
-      job, result, error, {{.bytes = "abc", .media_type = "image/png", .white_black = {}}}, {},
-      DeviceInfo{}, "1");
+  MadeFrame frame;
+  frame.rendered.images = {FakeImage(job.request.scene, job.request.images[0], 0)};
+  frame.error = error;
+  const v1::FrameHeader header =
+      DescribeFrame(job, frame, {{.bytes = "abc", .media_type = "image/png", .white_black = {}}},
+                    DeviceInfo{}, "1");
   const v1::MeasuredError& told = header.error();
   EXPECT_EQ(told.compared(), v1::COMPARED_FRAME_WITHOUT_SCATTERING);
   EXPECT_EQ(told.covered_pixels(), 2000U);
@@ -140,7 +141,7 @@ TEST(ConvertMeasurement, AndBackTellsTheErrorAndWhatWasCompared) {
   EXPECT_EQ(told.sample_worst(0).g(), -1.0);
   EXPECT_EQ(told.milliseconds(), 12.0);
 
-  const ImageMetadata metadata = DescribeImage(job, result, error, job.outputs[0], {}, "1");
+  const ImageMetadata metadata = DescribeImage(job, frame, job.outputs[0], {}, "1");
   for (const auto& [name, value] :
        {std::pair("relativeRmse", "0.25"), std::pair("low", "0.125"), std::pair("high", "0.5"),
         std::pair("rmse", "2"), std::pair("mse", "4"), std::pair("bias", "-0.5"),

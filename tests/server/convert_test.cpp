@@ -196,14 +196,15 @@ TEST(DescribeFrame, TellsSettingsAsUsedAndTheMatricesOfTheWholeImage) {
   crop.set_width(8);
   crop.set_height(4);
   const FrameJob job = MustConvert(request);
-  FrameResult result;
-  result.images = {FakeImage(job.request.scene, job.request.images[0], 0)};
-  result.lights.resize(1);
-  result.clamped_opacities = 3;
+  MadeFrame frame;
+  frame.rendered.images = {FakeImage(job.request.scene, job.request.images[0], 0)};
+  frame.rendered.lights.resize(1);
+  frame.rendered.clamped_opacities = 3;
+  frame.rendered.timings = {{"encode", 2.5}};
   const DeviceInfo device{.gl_renderer = "fake", .gl_version = "4.5"};
-  const v1::FrameHeader header = DescribeFrame(
-      job, result, {}, {{.bytes = "abc", .media_type = "image/png", .white_black = {}}},
-      {{"encode", 2.5}}, device, "1.2.3");
+  const v1::FrameHeader header =
+      DescribeFrame(job, frame, {{.bytes = "abc", .media_type = "image/png", .white_black = {}}},
+                    device, "1.2.3");
 
   EXPECT_EQ(header.metadata().request_id(), "shot 7");
   EXPECT_EQ(header.metadata().shadow().slices(), 128U);
@@ -217,7 +218,7 @@ TEST(DescribeFrame, TellsSettingsAsUsedAndTheMatricesOfTheWholeImage) {
   EXPECT_EQ(header.outputs(0).byte_size(), 3U);
   EXPECT_FALSE(header.outputs(0).has_white_value());
 
-  const ImageMetadata metadata = DescribeImage(job, result, {}, job.outputs[0], device, "1.2.3");
+  const ImageMetadata metadata = DescribeImage(job, frame, job.outputs[0], device, "1.2.3");
   EXPECT_EQ(metadata.data_window.width, 8);
   EXPECT_EQ(metadata.display_size, glm::ivec2(64, 48));
   EXPECT_EQ(*metadata.world_to_ndc, NdcFromWorld(job.request.scene.camera));
@@ -227,13 +228,13 @@ TEST(DescribeImage, LightBuffersCarryTheMatricesOfTheirLight) {
   v1::RenderFrameRequest request = MakeRequest();
   request.mutable_outputs(0)->set_kind(v1::OUTPUT_KIND_LIGHT_BUFFER);
   const FrameJob job = MustConvert(request);
-  FrameResult result;
-  result.lights.resize(1);
-  result.lights[0].light_texture_from_world[3][0] = 5.0;
-  result.lights[0].light_view_from_world[3][0] = 6.0;
-  const ImageMetadata metadata = DescribeImage(job, result, {}, job.outputs[0], DeviceInfo{}, "1");
-  EXPECT_EQ(*metadata.world_to_ndc, result.lights[0].light_texture_from_world);
-  EXPECT_EQ(*metadata.world_to_camera, result.lights[0].light_view_from_world);
+  MadeFrame frame;
+  LightReport& light = frame.rendered.lights.emplace_back();
+  light.light_texture_from_world[3][0] = 5.0;
+  light.light_view_from_world[3][0] = 6.0;
+  const ImageMetadata metadata = DescribeImage(job, frame, job.outputs[0], DeviceInfo{}, "1");
+  EXPECT_EQ(*metadata.world_to_ndc, light.light_texture_from_world);
+  EXPECT_EQ(*metadata.world_to_camera, light.light_view_from_world);
   EXPECT_EQ(metadata.display_size, glm::ivec2(0));
 }
 

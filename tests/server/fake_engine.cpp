@@ -21,6 +21,7 @@ FakeEngine::~FakeEngine() {
 absl::Status FakeEngine::Submit(FrameRequest request, std::stop_token stop, Done done) {
   const std::lock_guard lock(mutex_);
   if (!refusal_.ok()) {
+    ++refused_;
     return refusal_;
   }
   jobs_.push_back({std::move(request), std::move(stop), std::move(done)});
@@ -39,6 +40,11 @@ void FakeEngine::FailWith(absl::Status status) {
   failure_ = std::move(status);
 }
 
+void FakeEngine::PretendMilliseconds(double milliseconds) {
+  const std::lock_guard lock(mutex_);
+  milliseconds_ = milliseconds;
+}
+
 void FakeEngine::RefuseWith(absl::Status status) {
   const std::lock_guard lock(mutex_);
   refusal_ = std::move(status);
@@ -52,6 +58,11 @@ int FakeEngine::rendered() const {
 int FakeEngine::waiting() const {
   const std::lock_guard lock(mutex_);
   return static_cast<int>(jobs_.size());
+}
+
+int FakeEngine::refused() const {
+  const std::lock_guard lock(mutex_);
+  return refused_;
 }
 
 FrameRequest FakeEngine::last_request() const {
@@ -88,7 +99,7 @@ void FakeEngine::Work() {
       for (const Light& light : job.request.scene.lights) {
         frame.lights.push_back({.casts_shadows = light.casts_shadows(), .slices = 2});
       }
-      frame.timings.push_back({"composite", 0.25});
+      frame.timings.push_back({"composite", milliseconds_});
       result = std::move(frame);
       ++rendered_;
       last_request_ = job.request;

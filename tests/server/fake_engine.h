@@ -34,11 +34,15 @@ class FakeEngine : public FrameEngine {
   void SetGate(bool open);
   // What each frame comes to from now on; OK renders it.
   void FailWith(absl::Status status);
+  // What frames are said to take from now on.
+  void PretendMilliseconds(double milliseconds);
   // What Submit says from now on.
   void RefuseWith(absl::Status status);
 
   [[nodiscard]] int rendered() const;
   [[nodiscard]] int waiting() const;
+  // How often Submit has refused.
+  [[nodiscard]] int refused() const;
   [[nodiscard]] FrameRequest last_request() const;
 
  private:
@@ -57,6 +61,8 @@ class FakeEngine : public FrameEngine {
   bool open_ = true;
   bool closing_ = false;
   int rendered_ = 0;
+  int refused_ = 0;
+  double milliseconds_ = 0.25;
   absl::Status failure_;
   absl::Status refusal_;
   FrameRequest last_request_;

@@ -259,9 +259,10 @@ TEST_F(Measurement, FailsWhereTheFrameToCompareIsNotRendered) {
 }
 
 TEST(FrameLog, TellsTheRelativeError) {
-  ErrorEstimate error;
-  error.relative_rmse.value = 0.03125;
-  EXPECT_THAT(FrameLogLine(MustConvert(), {{"total", 2.0}}, error, absl::OkStatus()),
+  MadeFrame frame;
+  frame.rendered.timings = {{"total", 2.0}};
+  frame.error.emplace().relative_rmse.value = 0.03125;
+  EXPECT_THAT(FrameLogLine(MustConvert(), frame, absl::OkStatus()),
               HasSubstr("total_ms=2.00 relative_rmse=0.03125 outcome=OK"));
 }
 

@@ -186,8 +186,9 @@ TEST_F(Pipeline, EndWaitsForWhatWasAccepted) {
 TEST(FrameLog, IsOneLineOfKeysWhateverTheClientSends) {
   FrameJob job = MustConvert();
   job.request_id = "a \"b\" \\";
-  const std::string line = FrameLogLine(job, {{"light sweep", 1.5}, {"total", 2.0}}, {},
-                                        absl::InternalError("two\nlines"));
+  MadeFrame frame;
+  frame.rendered.timings = {{"light sweep", 1.5}, {"total", 2.0}};
+  const std::string line = FrameLogLine(job, frame, absl::InternalError("two\nlines"));
   EXPECT_THAT(line, HasSubstr(R"(request_id="a \"b\" \\")"));
   EXPECT_THAT(line, HasSubstr("technique=SHADOW_TECHNIQUE_HALF_ANGLE particles=2 size=64x48"));
   EXPECT_THAT(line, HasSubstr("light_sweep_ms=1.50 total_ms=2.00 outcome=INTERNAL"));

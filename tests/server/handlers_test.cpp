@@ -334,6 +334,29 @@ TEST_F(Sequence, MeasurementIsKeptUntilAnotherTakesItsPlace) {
               ::testing::ElementsAre("", "samples: 64", "samples: 64", "samples: 1024 seed: 3"));
 }
 
+TEST_F(Sequence, TargetIsKeptUntilSettingsTakeItsPlaceAndTheOtherWayRound) {
+  v1::RenderFrameRequest first = MakeRequest();
+  first.mutable_scene()->mutable_shadow()->set_slices(7);
+  v1::RenderFrameRequest target;
+  target.mutable_target()->set_max_time_ms(1000.0);
+  v1::RenderFrameRequest settings;
+  settings.mutable_scene()->mutable_shadow()->set_slices(9);
+  Play({Wrap(first), Wrap(target), Same(), Wrap(settings), Same(), Wrap(target)});
+  ASSERT_TRUE(sink_.finished()->ok()) << *sink_.finished();
+  std::vector<bool> has_target;
+  std::vector<uint32_t> slices;
+  for (const v1::RenderSequenceResponse& message : sink_.written()) {
+    if (message.has_header()) {
+      has_target.push_back(message.header().has_target());
+      slices.push_back(message.header().metadata().shadow().slices());
+    }
+  }
+  EXPECT_THAT(has_target, ::testing::ElementsAre(false, true, true, false, false, true));
+  EXPECT_EQ(slices.at(0), 7U);
+  EXPECT_EQ(slices.at(3), 9U);
+  EXPECT_EQ(slices.at(4), 9U);
+}
+
 TEST_F(Sequence, ParticlesOfTheStreamSurviveTheirEviction) {
   ParticleStore small(2 * 16);
   Backend backend{engine_.device(), limits_, version_, small, upload_memory_, pipeline_};

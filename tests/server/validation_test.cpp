@@ -493,6 +493,31 @@ INSTANTIATE_TEST_SUITE_P(
             "scene.inline_particles.velocity[0].x: inf"}),
     NameOf);
 
+INSTANTIATE_TEST_SUITE_P(
+    Target, Validation,
+    ::testing::Values(
+        Refusal{"NamesNothing", [](Request& r) { r.mutable_target(); },
+                "target: neither max_error nor max_time_ms"},
+        Refusal{"ErrorZero", [](Request& r) { r.mutable_target()->set_max_error(0.0); },
+                "target.max_error: 0"},
+        Refusal{"ErrorAboveOne", [](Request& r) { r.mutable_target()->set_max_error(1.5); },
+                "target.max_error: 1.5"},
+        Refusal{"ErrorNan", [](Request& r) { r.mutable_target()->set_max_error(kNan); },
+                "target.max_error: nan"},
+        Refusal{"TimeZero", [](Request& r) { r.mutable_target()->set_max_time_ms(0.0); },
+                "target.max_time_ms: 0"},
+        Refusal{"TimeInfinite", [](Request& r) { r.mutable_target()->set_max_time_ms(kInf); },
+                "target.max_time_ms: inf"},
+        Refusal{"BesideSettings",
+                [](Request& r) {
+                  r.mutable_target()->set_max_time_ms(5.0);
+                  ShadowOf(r).set_slices(3);
+                },
+                "scene.shadow: set"},
+        Refusal{"TooMuchToMeasure", [](Request& r) { r.mutable_target()->set_max_error(0.5); },
+                "target.max_error: a measurement of 65536 samples times 2 particles"}),
+    NameOf);
+
 TEST(Validation, PointLightMayStandAmongParticlesWhereNothingIsShadowed) {
   Request request = MakeRequest();
   UsePointLight(request, 0.5);
