@@ -71,10 +71,10 @@ HALFLIGHT_CONSTANT(kMaxBlurRadius, 63);  // texels to each side
 // with w the depth along the axis (perspective), or x, y in world units (orthographic); y is up.
 // Pixel coordinates count from the target's first row, which is the top of the image.
 struct ProjectionBlock {
-  mat4 view_from_world;   // rotation only
-  // Particle origin minus eye, in two parts (xyz): near_translation, world axes, is added before the
-  // rotation, far_translation, view axes, after it. Near the eye the first sum is exact; far from it
-  // the second leaves what lies across the view its digits.
+  mat4 view_from_world;  // rotation only
+  // Particle origin minus eye, in two parts (xyz): near_translation, world axes, is added before
+  // the rotation, far_translation, view axes, after it. Near the eye the first sum is exact; far
+  // from it the second leaves what lies across the view its digits.
   vec4 near_translation;
   vec4 far_translation;
   vec4 pixel_from_plane;  // xy: scale, zw: offset
