@@ -171,10 +171,11 @@ int Shading::SlotOf(int light) const {
 
 double NearDepth(const Scene& scene) {
   constexpr double kWide = 8.0;
+  constexpr double kSteep = 2.0;  // nearer, the linear form is ill-conditioned
   const bool varies =
       std::any_of(scene.lights.begin(), scene.lights.end(),
                   [&](const Light& light) { return Varies(light, scene.material); });
-  return varies ? 0.0 : kWide;
+  return varies ? kSteep : kWide;
 }
 
 Shading ShadeSprites(const Scene& scene, const ParticleView& particles, const Projection& eye,

@@ -42,7 +42,8 @@ struct Shading {
 
 // Depth in radii within which a particle fills so wide an angle that its shadow is not taken as
 // linear in the image: the error of that is below the fit's from here on. Lights whose radiance
-// varies over a sprite are better off with the linear form, which knows of it.
+// varies over a sprite are better off with the linear form, which knows of it: near particles take
+// it at their centre.
 double NearDepth(const Scene& scene);
 
 // `fits` has one for each light of the scene, null for those that cast no shadows. `keep_depth` and

@@ -68,6 +68,42 @@ TEST_F(Fuzz, PropertiesHoldOfRandomScenes) {
   }
 }
 
+// The light sweep's bound of a property: that of half-angle slicing, but where the fit of the light
+// shows, or that a particle more shifts the chunks in which a tile is summed.
+double SweepBoundOf(const Property& property, const Scene& scene) {
+  const std::string name = property.name;
+  if (name == "EqualsModel" || name == "BreaksTiesByIndex") return 0.4;
+  if (name == "IgnoresTransparentParticles") return 1e-6;
+  return BoundOf(property, scene);
+}
+
+TEST_F(Fuzz, PropertiesHoldOfTheLightSweep) {
+  const uint64_t seed = FromEnvironment("HALFLIGHT_FUZZ_SEED", 1);
+  const uint64_t cases = FromEnvironment("HALFLIGHT_FUZZ_CASES", 60);
+  const auto swept = [](const FrameRequest& request) {
+    FrameRequest changed = request;
+    ShadowSettings& shadow = changed.scene.shadow;
+    shadow.fit_degree = kMaxFitDegree;
+    if (shadow.technique == ShadowTechniqueKind::kHalfAngle) {
+      shadow.technique = ShadowTechniqueKind::kLightSweep;
+    }
+    return Render(changed);
+  };
+  for (const Property& property : Properties()) {
+    double largest = 0.0;
+    for (uint64_t number = 0; number < cases; ++number) {
+      Dice dice(seed, number);
+      const Scene scene = DrawScene(dice);
+      const double deviation = property.deviation(swept, scene, dice);
+      const double bound = SweepBoundOf(property, scene);
+      largest = std::max(largest, bound > 0.0 ? deviation / bound : deviation);
+      EXPECT_LE(deviation, bound) << Replay(property, seed, number, scene);
+    }
+    test::PrintFigure("random scenes, light sweep", std::string(property.name) + " (of its bound)",
+                      largest, 1.0);
+  }
+}
+
 // A renderer wrong in one way.
 struct Fault {
   const char* name;
