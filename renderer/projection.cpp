@@ -45,12 +45,6 @@ glm::dmat4 ViewAlong(const glm::dvec3& position, const glm::dvec3& direction) {
   return view;
 }
 
-// Slopes of the two tangents from the origin to a circle of radius r around (x, w), w > r.
-glm::dvec2 TangentSlopes(double x, double w, double r) {
-  const double reach = r * std::sqrt(x * x + (w - r) * (w + r));
-  return glm::dvec2(x * w - reach, x * w + reach) / ((w - r) * (w + r));
-}
-
 PlaneBounds BoundsInPlane(const Projection& projection, const ParticleView& particles) {
   if (particles.size() == 0) return {glm::dvec2(-1.0), glm::dvec2(1.0)};
   std::vector<PlaneBounds> by_worker(WorkerCount(particles.size()));
@@ -93,6 +87,11 @@ bool ReachesPlane(const glm::dvec3& point, const glm::dvec3& forward, double enl
 }
 
 }  // namespace
+
+glm::dvec2 TangentSlopes(double x, double w, double r) {
+  const double reach = r * std::sqrt(x * x + (w - r) * (w + r));
+  return glm::dvec2(x * w - reach, x * w + reach) / ((w - r) * (w + r));
+}
 
 glm::dmat4 Projection::texture_from_world() const {
   const glm::dvec2 scale = pixel_from_plane / glm::dvec2(size);

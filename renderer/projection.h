@@ -38,6 +38,9 @@ Projection EyeProjection(const Camera& camera, const glm::ivec2& target_size, do
 // Along which the camera looks, in the world. Unit length.
 glm::dvec3 ViewDirection(const Camera& camera);
 
+// Slopes of the two tangents from the origin to a circle of radius r around (x, w), w > r.
+glm::dvec2 TangentSlopes(double x, double w, double r);
+
 // Whether any particle reaches the plane through the projection's eye, or comes so near to it that
 // rounding may tell otherwise.
 bool ReachesEyePlane(const Projection& projection, const ParticleView& particles);

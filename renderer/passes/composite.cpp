@@ -5,6 +5,7 @@
 #include <glm/matrix.hpp>
 
 #include "renderer/gl/debug.h"
+#include "renderer/radiance.h"
 #include "shaders/bindings.h"
 #include "spirv/composite.frag.h"
 #include "spirv/composite.vert.h"
@@ -35,12 +36,6 @@ shader::LightBlock DescribeLight(const Light& light, const glm::dmat4& view_from
   return block;
 }
 
-// Whether the light's radiance, shadows aside, depends on the ray or on the place.
-bool Varies(const Light& light, const Material& material) {
-  const auto* point = std::get_if<PointLight>(&light.kind);
-  return material.phase_g != 0.0F || (point != nullptr && point->inverse_square_falloff);
-}
-
 // The lights of a traversal, as the shader wants them: what is the same everywhere summed up.
 struct TraversalLights {
   glm::vec3 constant{0.0F};
@@ -54,7 +49,7 @@ TraversalLights SortLights(const Scene& scene, const Traversal& traversal) {
   if (traversal.ambient_and_emission) lights.constant = scene.material.ambient;
   if (traversal.shadow_light) {
     const Light& light = scene.lights[static_cast<size_t>(*traversal.shadow_light)];
-    lights.shadow_light_varies = Varies(light, scene.material);
+    lights.shadow_light_varies = RadianceVaries(light, scene.material);
     if (lights.shadow_light_varies) {
       lights.varying.push_back(&light);
     } else {
@@ -63,7 +58,7 @@ TraversalLights SortLights(const Scene& scene, const Traversal& traversal) {
   }
   for (const int index : traversal.unshadowed_lights) {
     const Light& light = scene.lights[static_cast<size_t>(index)];
-    if (Varies(light, scene.material)) {
+    if (RadianceVaries(light, scene.material)) {
       lights.varying.push_back(&light);
     } else {
       lights.constant += light.color;

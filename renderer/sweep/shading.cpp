@@ -8,6 +8,7 @@
 #include <glm/matrix.hpp>
 
 #include "renderer/parallel.h"
+#include "renderer/radiance.h"
 #include "renderer/sweep/polynomial.h"
 
 namespace halflight::sweep {
@@ -72,11 +73,6 @@ class RadianceFactor {
   bool falloff_ = false;
 };
 
-bool Varies(const Light& light, const Material& material) {
-  const auto* point = std::get_if<PointLight>(&light.kind);
-  return material.phase_g != 0.0F || (point != nullptr && point->inverse_square_falloff);
-}
-
 // -ln(value(x, y) / value(0, 0)) as a polynomial through values half way to the rim.
 template <typename Value>
 Coefficients FitExponent(const Value& value, double at_center, int degree) {
@@ -131,7 +127,7 @@ std::vector<TileLight> ListLights(const Scene& scene, const std::vector<const Li
                                   bool keep_transmittance) {
   std::vector<TileLight> lights;
   for (size_t l = 0; l < scene.lights.size(); ++l) {
-    const bool varies = Varies(scene.lights[l], scene.material);
+    const bool varies = RadianceVaries(scene.lights[l], scene.material);
     const auto index = static_cast<int>(l);
     if (fits[l] != nullptr || varies) lights.push_back({index, fits[l], varies, true});
     // Its exponent holds more than the shadow: the transmittance wants one of its own.
@@ -174,7 +170,7 @@ double NearDepth(const Scene& scene) {
   constexpr double kSteep = 2.0;  // nearer, the linear form is ill-conditioned
   const bool varies =
       std::any_of(scene.lights.begin(), scene.lights.end(),
-                  [&](const Light& light) { return Varies(light, scene.material); });
+                  [&](const Light& light) { return RadianceVaries(light, scene.material); });
   return varies ? kSteep : kWide;
 }
 
@@ -200,7 +196,8 @@ Shading ShadeSprites(const Scene& scene, const ParticleView& particles, const Pr
                                                    glm::transpose(glm::dmat3(eye.view_from_world)));
   }
   for (size_t l = 0; l < scene.lights.size(); ++l) {
-    if (fits[l] == nullptr && !Varies(scene.lights[l], material)) constant += scene.lights[l].color;
+    if (fits[l] == nullptr && !RadianceVaries(scene.lights[l], material))
+      constant += scene.lights[l].color;
   }
 
   const size_t lights = shading.lights.size();
@@ -266,10 +263,12 @@ Shading ShadeSprites(const Scene& scene, const ParticleView& particles, const Pr
             light.adds ? ToRgb(albedo * source.color * static_cast<float>(factor)) : Rgb{};
 
         float* const own = &shading.exponent[(place * lights + l) * exponents * terms];
+        const LightAxes axes =
+            light.fit == nullptr ? LightAxes{}
+                                 : AxesOf(*light.fit, i, particles.optical_depth(i), rotations[l]);
         for (size_t e = 0; e < exponents; ++e) {
           const std::span<float> out(own + e * terms, terms);
           if (light.fit != nullptr) {
-            const LightAxes axes = AxesOf(*light.fit, i, particles.optical_depth(i), rotations[l]);
             const std::span<const float> depth(&light.fit->depth[i * terms], terms);
             const double density = source.shadow_density[static_cast<glm::length_t>(e)];
             if (near) {

@@ -18,13 +18,7 @@ namespace {
 // Radii from the plane through the eye within which a particle may reach it, as rounding goes.
 constexpr double kLeastNearDepth = 1.0005;
 
-// Slopes of the tangents from the origin to a circle around (x, w), w > r.
-glm::dvec2 TangentSlopes(double x, double w, double r) {
-  const double reach = r * std::sqrt(x * x + (w - r) * (w + r));
-  return glm::dvec2(x * w - reach, x * w + reach) / ((w - r) * (w + r));
-}
-
-// The same where the disc reaches w <= 0: only what lies at w > 0 counts.
+// TangentSlopes where the disc reaches w <= 0: only what lies at w > 0 counts.
 glm::dvec2 VisibleSlopes(double x, double w, double r) {
   constexpr double kInfinity = 1e30;
   constexpr double kHalfPi = 0.5 * std::numbers::pi;

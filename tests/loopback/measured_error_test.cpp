@@ -15,16 +15,7 @@
 namespace halflight::loopback {
 namespace {
 
-class MeasuredError : public ::testing::Test {
- protected:
-  client::RenderedFrame Render(const v1::RenderFrameRequest& request, const Scene& scene) {
-    const client::EncodedParticles particles = Encoded(*scene.particles);
-    return MustRender(client_, request, &particles);
-  }
-
-  const TestServer server_;
-  client::Client client_ = server_.Connect();
-};
+class MeasuredError : public WireTest {};
 
 bool Holds(const v1::EstimatedFigure& figure, double truth) {
   return figure.low() <= truth && truth <= figure.high();

@@ -19,16 +19,7 @@ v1::RenderFrameRequest TargetOf(const Scene& scene, const std::vector<v1::Output
   return request;
 }
 
-class Target : public ::testing::Test {
- protected:
-  client::RenderedFrame Render(const v1::RenderFrameRequest& request, const Scene& scene) {
-    const client::EncodedParticles particles = Encoded(*scene.particles);
-    return MustRender(client_, request, &particles);
-  }
-
-  const TestServer server_;
-  client::Client client_ = server_.Connect();
-};
+class Target : public WireTest {};
 
 // The returned attempt is one of them, and all else in the header is of it.
 void ExpectWhole(const v1::FrameHeader& header) {

@@ -7,11 +7,27 @@
 #include <string>
 #include <vector>
 
+#include <gtest/gtest.h>
+
+#include "client/client.h"
+#include "tests/loopback/test_server.h"
 #include "tests/loopback/wire_scene.h"
 #include "tests/oracle/plume.h"
 #include "tests/renderer/test_scene.h"
 
 namespace halflight::loopback {
+
+// A server, and a client of it that sends the particles with each frame asked for.
+class WireTest : public ::testing::Test {
+ protected:
+  client::RenderedFrame Render(const v1::RenderFrameRequest& request, const Scene& scene) {
+    const client::EncodedParticles particles = Encoded(*scene.particles);
+    return MustRender(client_, request, &particles);
+  }
+
+  const TestServer server_;
+  client::Client client_ = server_.Connect();
+};
 
 inline Scene Plume() {
   Scene scene;

@@ -53,18 +53,6 @@ struct ShadowCase {
   bool varied = false;  // radius, opacity, colour and emission of each particle its own
 };
 
-void VaryParticles(Scene& scene) {
-  auto set = std::make_shared<ParticleSet>(*scene.particles);
-  for (size_t i = 0; i < set->size(); ++i) {
-    const auto phase = static_cast<float>(i % 17) / 17.0F;
-    set->radii.push_back(0.02F + 0.04F * phase);
-    set->opacities.push_back(0.05F + 0.4F * (1.0F - phase));
-    set->colors.emplace_back(phase, 0.5F, 1.0F - phase);
-    set->emissions.emplace_back(i % 29 == 0 ? 0.3F : 0.0F, 0.0F, 0.0F);
-  }
-  scene.particles = set;
-}
-
 class PlumeLit : public test::GlTest, public testing::WithParamInterface<ShadowCase> {};
 
 TEST_P(PlumeLit, IsHalfAngleSlicingWithinHalfAPercent) {
@@ -79,7 +67,7 @@ TEST_P(PlumeLit, IsHalfAngleSlicingWithinHalfAPercent) {
   scene.shadow.spacing = c.spacing;
   scene.material.phase_g = c.phase_g;
   scene.material.profile = c.profile;
-  if (c.varied) VaryParticles(scene);
+  if (c.varied) test::VaryParticles(scene, 0.05F, 0.4F);
   if (c.orthographic) scene.camera.projection = Orthographic{3.4};
   const oracle::OracleImage reference = oracle::RenderHalfAngle(scene, {.stride = kStride});
   const oracle::ImageError error = oracle::CompareColor(RenderBeauty(scene), reference);

@@ -65,6 +65,20 @@ inline Scene BallScene(size_t count, int size = 96) {
   return scene;
 }
 
+// Gives each particle radius, colour and emission of its own, and an opacity from `least_opacity`
+// up to `opacity_range` above it.
+inline void VaryParticles(Scene& scene, float least_opacity, float opacity_range) {
+  auto set = std::make_shared<ParticleSet>(*scene.particles);
+  for (size_t i = 0; i < set->size(); ++i) {
+    const auto phase = static_cast<float>(i % 17) / 17.0F;
+    set->radii.push_back(0.02F + 0.04F * phase);
+    set->opacities.push_back(least_opacity + opacity_range * (1.0F - phase));
+    set->colors.emplace_back(phase, 0.5F, 1.0F - phase);
+    set->emissions.emplace_back(i % 29 == 0 ? 0.3F : 0.0F, 0.0F, 0.0F);
+  }
+  scene.particles = set;
+}
+
 inline FrameRequest Beauty(Scene scene) { return {std::move(scene), {{ImageKind::kBeauty}}}; }
 
 }  // namespace halflight::test

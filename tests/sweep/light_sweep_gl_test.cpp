@@ -74,18 +74,6 @@ Light Point(const glm::dvec3& position, bool falloff) {
   return light;
 }
 
-void Vary(Scene& scene) {
-  auto set = std::make_shared<ParticleSet>(*scene.particles);
-  for (size_t i = 0; i < set->size(); ++i) {
-    const auto phase = static_cast<float>(i % 17) / 17.0F;
-    set->radii.push_back(0.02F + 0.04F * phase);
-    set->opacities.push_back(0.02F + 0.3F * (1.0F - phase));
-    set->colors.emplace_back(phase, 0.5F, 1.0F - phase);
-    set->emissions.emplace_back(i % 29 == 0 ? 0.3F : 0.0F, 0.0F, 0.0F);
-  }
-  scene.particles = set;
-}
-
 INSTANTIATE_TEST_SUITE_P(
     Scenes, LightSweepOf,
     testing::Values(
@@ -137,7 +125,7 @@ INSTANTIATE_TEST_SUITE_P(
                     s.material.phase_g = 0.6F;
                   },
                   0.05},
-        SweepCase{"VariedParticles", Vary, 0.03},
+        SweepCase{"VariedParticles", [](Scene& s) { test::VaryParticles(s, 0.02F, 0.3F); }, 0.03},
         SweepCase{"Supersampled",
                   [](Scene& s) {
                     s.sampling.supersample = 2;
