@@ -83,6 +83,8 @@ Image LightImage(const Image& optical_depth, LightQuantity quantity, const Light
                    });
 }
 
+namespace {
+
 Image SelectImage(const ImageRequest& request, const Scene& scene, const DrawnImages& drawn) {
   const auto light = static_cast<size_t>(request.light_index);
   switch (request.kind) {
@@ -101,6 +103,17 @@ Image SelectImage(const ImageRequest& request, const Scene& scene, const DrawnIm
       return LightImage(drawn.shadows[light].light_layers, request.quantity, scene.lights[light]);
   }
   return drawn.beauty;
+}
+
+}  // namespace
+
+std::vector<Image> SelectImages(const FrameRequest& request, const DrawnImages& drawn) {
+  std::vector<Image> images;
+  images.reserve(request.images.size());
+  for (const ImageRequest& image : request.images) {
+    images.push_back(SelectImage(image, request.scene, drawn));
+  }
+  return images;
 }
 
 }  // namespace halflight

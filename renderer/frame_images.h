@@ -3,12 +3,20 @@
 
 #include <vector>
 
+#include "renderer/frame.h"
 #include "renderer/gl/object.h"
 #include "renderer/image.h"
 #include "renderer/scene.h"
-#include "renderer/shadow_technique.h"
 
 namespace halflight {
+
+// What a technique leaves of a light besides its part of the image.
+struct ShadowResult {
+  // Optical depth in the light buffer behind all particles, and after every slice: one or three
+  // channels, empty unless an output shows them.
+  Image light_buffer;
+  Image light_layers;
+};
 
 // What a technique leaves behind, by kind of image.
 struct DrawnImages {
@@ -18,8 +26,8 @@ struct DrawnImages {
   std::vector<ShadowResult> shadows;  // by light
 };
 
-// The image that an output shows.
-Image SelectImage(const ImageRequest& request, const Scene& scene, const DrawnImages& drawn);
+// The images that were asked for.
+std::vector<Image> SelectImages(const FrameRequest& request, const DrawnImages& drawn);
 
 // All four channels of a texture. Waits for the device.
 Image ReadTexture(const gl::Texture& texture);

@@ -1,48 +1,53 @@
-// The one interface chosen at run time: how a light's shadows get into the image.
+// The one interface chosen at run time: how shadows get into the image. A technique plans a frame
+// without GL and draws it whole; it has a row in the table of shadow_technique.cpp.
 #pragma once
 
+#include <stop_token>
 #include <vector>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
-#include "renderer/frame_plan.h"
-#include "renderer/image.h"
+#include "renderer/frame.h"
+#include "renderer/particle_view.h"
 
 namespace halflight {
 
-struct LightReport;
-struct TraversalContext;
+struct DeviceInfo;
+struct Gpu;
+class StageClock;
 
-// What a technique leaves of a light besides its part of the image.
-struct ShadowResult {
-  // Optical depth in the light buffer behind all particles, and after every slice: one or three
-  // channels, empty unless the traversal keeps them.
-  Image light_buffer;
-  Image light_layers;
+// Everything that a frame is drawn from. `plan` is that of the same request.
+struct DrawContext {
+  Gpu& gpu;
+  const DeviceInfo& device;
+  const FrameRequest& request;
+  const ParticleView& particles;
+  const FramePlan& plan;
+  StageClock& clock;
+  std::stop_token stop;
+};
+
+struct DrawnFrame {
+  std::vector<Image> images;         // in the order of the request
+  std::vector<LightReport> reports;  // one for each light of the scene
 };
 
 class ShadowTechnique {
  public:
   virtual ~ShadowTechnique() = default;
 
-  // How light number `light` of the scene will be drawn: axis, slices, light buffer. No GL.
+  // Adds to a plan whose sizes are set: what will be drawn, and the passes that it comes to. No GL.
   // InvalidArgument, naming the field, for what the technique cannot do.
-  [[nodiscard]] virtual absl::StatusOr<Traversal> PlanLight(const Scene& scene,
-                                                            const ParticleView& particles,
-                                                            int light) const = 0;
+  virtual absl::Status Plan(const FrameRequest& request, const ParticleView& particles,
+                            FramePlan& plan) const = 0;
 
-  // The passes that the traversal comes to, for people.
-  [[nodiscard]] virtual std::vector<PlannedPass> DescribePasses(
-      const Traversal& traversal) const = 0;
-
-  // Draws the traversal into the context's targets and fills in `report`. Cancelled when the
-  // context's stop token says so. Needs the GL context.
-  virtual absl::StatusOr<ShadowResult> Draw(const TraversalContext& context,
-                                            LightReport& report) const = 0;
+  // Cancelled soon after the context's stop was requested. The GL context is current.
+  [[nodiscard]] virtual absl::StatusOr<DrawnFrame> Draw(const DrawContext& context) const = 0;
 };
 
-// Of the kinds that draw traversals: neither kReference (reference_frame.h) nor kLightSweep
-// (sweep/sweep_frame.h).
 const ShadowTechnique& TechniqueFor(ShadowTechniqueKind kind);
+
+// For techniques that go over the lights: at most kMaxLights.
+absl::Status CheckLightCount(const Scene& scene);
 
 }  // namespace halflight

@@ -1,262 +1,199 @@
 #include "renderer/techniques/half_angle.h"
 
-#include <algorithm>
-#include <cmath>
-#include <limits>
-
-#include <glm/geometric.hpp>
+#include <utility>
 
 #include "absl/strings/str_cat.h"
-#include "renderer/frame.h"
-#include "renderer/scattering.h"
-#include "renderer/traversal_context.h"
+#include "renderer/frame_engine.h"
+#include "renderer/frame_images.h"
+#include "renderer/gl/debug.h"
+#include "renderer/gpu.h"
+#include "renderer/passes/composite.h"
+#include "renderer/passes/project.h"
+#include "renderer/passes/resolve.h"
+#include "renderer/techniques/half_angle_light.h"
+#include "renderer/techniques/traversal_context.h"
 
 namespace halflight {
 
 namespace {
 
-// How light spreads along one light's traversal.
-class Spread {
- public:
-  // Of a scene that scatters. `light_along_axis`: distance along the axis for one along the light.
-  Spread(const TraversalContext& context, const Light& light, double light_along_axis)
-      : shadow_(context.scene.shadow),
-        spread_(context.scene.material.scattering_spread),
-        light_along_axis_(light_along_axis) {
-    if (context.scene.material.physical_scattering) {
-      physical_.emplace(context.particles, light, *context.traversal.axis,
-                        *context.scene.material.physical_scattering,
-                        context.scene.material.profile);
-    }
+// What the outputs ask of a shadow-casting light's traversal.
+void KeepWhatOutputsShow(const std::vector<ImageRequest>& images, Traversal& traversal) {
+  for (const ImageRequest& image : images) {
+    if (image.light_index != traversal.shadow_light) continue;
+    traversal.keep_transmittance |= image.kind == ImageKind::kLightTransmittance;
+    traversal.keep_light_buffer |= image.kind == ImageKind::kLightBuffer;
+    traversal.keep_layers |= image.kind == ImageKind::kLightLayers;
   }
-
-  // Squared world units by which light spreads between two positions along the axis.
-  [[nodiscard]] glm::dvec3 Variance(double from, double to) const {
-    if (physical_) return physical_->VarianceAt(to) - physical_->VarianceAt(from);
-    return glm::dvec3(spread_ * spread_ * (to - from) / light_along_axis_);
-  }
-
-  // The same in texels of the light buffer, between two slices that lie there.
-  [[nodiscard]] BlurVariance InTexels(double from, double to,
-                                      const glm::dvec2& texels_per_unit) const {
-    if (shadow_.blur_mode == BlurMode::kTexelsPerSlice) {
-      const double texels = shadow_.blur_texels;
-      return {glm::dvec3(texels * texels), glm::dvec3(texels * texels)};
-    }
-    const glm::dvec3 variance = Variance(from, to);
-    return {variance * texels_per_unit.x * texels_per_unit.x,
-            variance * texels_per_unit.y * texels_per_unit.y};
-  }
-
-  // World units by which light that crosses the whole cloud has spread sideways, thrice the
-  // standard deviation; never so much that the cloud itself shrinks to nothing in the light buffer.
-  [[nodiscard]] double Border(const OffsetBounds& bounds) const {
-    if (shadow_.blur_mode == BlurMode::kTexelsPerSlice) return 0.0;
-    const double diameter = glm::distance(bounds.low, bounds.high);
-    const glm::dvec3 variance = physical_
-                                    ? physical_->VarianceAt(std::numeric_limits<double>::infinity())
-                                    : glm::dvec3(spread_ * spread_ * diameter);
-    return std::min(3.0 * std::sqrt(std::max({variance.r, variance.g, variance.b})),
-                    0.25 * diameter);
-  }
-
- private:
-  const ShadowSettings& shadow_;
-  double spread_;
-  double light_along_axis_;
-  std::optional<PhysicalSpread> physical_;
-};
-
-// Texels of the light buffer for one world unit at the middle of the particles.
-glm::dvec2 TexelsPerUnit(const Projection& light, const ParticleView& particles) {
-  const glm::dvec2 texels_per_unit = glm::abs(light.pixel_from_plane);
-  if (light.orthographic) return texels_per_unit;
-  return texels_per_unit /
-         glm::distance(particles.set().origin + particles.bounds().center(), light.eye());
 }
 
-LightChannels ChannelsOf(const Traversal& traversal) {
-  return {.colored = traversal.colored_light_buffer, .unscattered = traversal.keep_unscattered};
+void DescribePasses(FramePlan& plan) {
+  for (const Traversal& traversal : plan.traversals) {
+    if (traversal.shadow_light) {
+      for (PlannedPass& pass : DescribeHalfAnglePasses(traversal)) {
+        plan.passes.push_back(std::move(pass));
+      }
+    } else {
+      plan.passes.push_back({traversal.axis ? "sort by depth" : "sort by distance from the eye",
+                             "nothing casts shadows", 1});
+      plan.passes.push_back({"project particles for the eye", "every traversal", 1});
+      plan.passes.push_back({"composite", "the image", 1});
+    }
+  }
 }
 
-// The light buffers of a traversal. `before` holds what the slices so far left; `after` also the
-// current slice, and `scratch` is the blur's; neither exists unless it is needed.
-struct LightBuffers {
-  LightBuffer before;
-  LightBuffer after;
-  LightBuffer scratch;
-
-  explicit LightBuffers(const Traversal& traversal) {
-    const int size = traversal.light_buffer_size;
-    const LightChannels channels = ChannelsOf(traversal);
-    before = MakeLightBuffer("light buffer", size, channels);
-    if (traversal.interpolate) after = MakeLightBuffer("light buffer, next", size, channels);
-    if (traversal.blur) scratch = MakeLightBuffer("light buffer, blur", size, channels);
+absl::Status CheckTargetSize(const FramePlan& plan, const DeviceInfo& device) {
+  for (const int side : {plan.composite_size.x, plan.composite_size.y}) {
+    if (side > device.max_texture_size) {
+      return absl::InvalidArgumentError(absl::StrCat("camera size times sampling: ", side,
+                                                     " pixels, allowed on ", device.gl_renderer,
+                                                     ": at most ", device.max_texture_size));
+    }
   }
-};
-
-void AppendLayer(Image layer, Image& layers) {
-  if (layers.pixels.empty()) {
-    layers = std::move(layer);
-    return;
+  for (const Traversal& traversal : plan.traversals) {
+    if (traversal.light_buffer_size > device.max_texture_size) {
+      return absl::InvalidArgumentError(
+          absl::StrCat("shadow.light_buffer_size: ", traversal.light_buffer_size, ", allowed on ",
+                       device.gl_renderer, ": at most ", device.max_texture_size));
+    }
   }
-  layers.pixels.insert(layers.pixels.end(), layer.pixels.begin(), layer.pixels.end());
-  ++layers.layers;
+  return absl::OkStatus();
+}
+
+absl::Status DrawUnshadowed(const TraversalContext& context) {
+  context.clock.BeginCpu("sort");
+  const ParticleOrder order =
+      OrderParticles(context.particles, context.traversal,
+                     context.eye.projection.eye() - context.particles.set().origin);
+  context.clock.BeginGpu("project");
+  const OrderBuffers order_buffers = UploadOrder(order);
+  absl::StatusOr<gl::Buffer> splats = ProjectParticles(
+      context.gpu, context.buffers, order_buffers, context.eye, "project particles for the eye");
+  if (!splats.ok()) return splats.status();
+  context.clock.BeginGpu("light and composite");
+  const CompositePass composite =
+      PrepareComposite(context.scene, context.traversal, order_buffers, context.buffers,
+                       context.eye, *splats, nullptr, nullptr, context.target);
+  return CompositeSlice(context.gpu, composite, 0, static_cast<uint32_t>(order.particles.size()),
+                        nullptr, context.target);
+}
+
+// Reads a target back, resolved to the image's size where sampling asks for it.
+absl::StatusOr<Image> ReadResolved(Gpu& gpu, const gl::Texture& samples, const Sampling& sampling,
+                                   const FramePlan& plan) {
+  if (sampling.supersample == 1 && sampling.downsample == 1) return ReadTexture(samples);
+  absl::StatusOr<gl::Texture> pixels = ResolveSamples(gpu, samples, sampling, plan.window_size);
+  if (!pixels.ok()) return pixels.status();
+  return ReadTexture(*pixels);
+}
+
+// Draws one traversal and reads back what it adds to the frame.
+absl::Status DrawTraversal(const TraversalContext& context, const FramePlan& plan,
+                           std::vector<LightReport>& reports, DrawnImages& drawn) {
+  const Traversal& traversal = context.traversal;
+  if (traversal.shadow_light) {
+    const auto light = static_cast<size_t>(*traversal.shadow_light);
+    absl::StatusOr<ShadowResult> shadow = DrawHalfAngleLight(context, reports[light]);
+    if (!shadow.ok()) return shadow.status();
+    drawn.shadows[light] = *std::move(shadow);
+  } else if (absl::Status status = DrawUnshadowed(context); !status.ok()) {
+    return status;
+  }
+
+  context.clock.BeginCpu("readback");
+  const Sampling& sampling = context.scene.sampling;
+  absl::StatusOr<Image> image = ReadResolved(context.gpu, context.target.image, sampling, plan);
+  if (!image.ok()) return image.status();
+  if (drawn.beauty.pixels.empty()) {
+    drawn.beauty = *std::move(image);
+  } else {
+    AddColors(*image, drawn.beauty);
+  }
+  if (context.target.depth) {
+    absl::StatusOr<Image> depth = ReadResolved(context.gpu, context.target.depth, sampling, plan);
+    if (!depth.ok()) return depth.status();
+    drawn.depth = *std::move(depth);
+  }
+  if (context.target.transmittance) {
+    absl::StatusOr<Image> transmittance =
+        ReadResolved(context.gpu, context.target.transmittance, sampling, plan);
+    if (!transmittance.ok()) return transmittance.status();
+    drawn.transmittance[static_cast<size_t>(*traversal.shadow_light)] = *std::move(transmittance);
+  }
+  return absl::OkStatus();
 }
 
 }  // namespace
 
-HalfAngleAxis ComputeHalfAngleAxis(const glm::dvec3& view, const glm::dvec3& light) {
-  if (glm::dot(view, light) > 0.0) return {glm::normalize(view + light), false};
-  return {glm::normalize(light - view), true};
+absl::Status HalfAngle::Plan(const FrameRequest& request, const ParticleView& particles,
+                             FramePlan& plan) const {
+  const Scene& scene = request.scene;
+  if (absl::Status status = CheckLightCount(scene); !status.ok()) return status;
+
+  // One traversal for each light that casts shadows: each has an axis of its own.
+  std::vector<int> unshadowed;
+  for (int light = 0; light < static_cast<int>(scene.lights.size()); ++light) {
+    if (!scene.lights[static_cast<size_t>(light)].casts_shadows()) {
+      unshadowed.push_back(light);
+      continue;
+    }
+    absl::StatusOr<Traversal> traversal = PlanHalfAngleLight(scene, particles, light);
+    if (!traversal.ok()) return traversal.status();
+    traversal->shadow_light = light;
+    KeepWhatOutputsShow(request.images, *traversal);
+    plan.traversals.push_back(*std::move(traversal));
+  }
+  // Without shadows: one walk in the order of distance from the eye, as the image model asks; of
+  // parallel rays, each from an eye of its own, that is the depth along them.
+  if (plan.traversals.empty()) {
+    plan.traversals.emplace_back();
+    if (std::holds_alternative<Orthographic>(scene.camera.projection)) {
+      plan.traversals.front().axis = ViewDirection(scene.camera);
+    }
+  }
+  plan.traversals.front().ambient_and_emission = true;
+  plan.traversals.front().unshadowed_lights = std::move(unshadowed);
+
+  DescribePasses(plan);
+  return absl::OkStatus();
 }
 
-absl::StatusOr<Traversal> HalfAngle::PlanLight(const Scene& scene, const ParticleView& particles,
-                                               int light) const {
-  const Light& source = scene.lights[static_cast<size_t>(light)];
-  if (LiesAmong(source, particles)) {
-    const glm::dvec3& at = std::get<PointLight>(source.kind).position;
-    return absl::InvalidArgumentError(absl::StrCat(
-        "lighting.lights[", light, "].point.position: (", at.x, ", ", at.y, ", ", at.z,
-        "), allowed: outside the particles, for a light that casts shadows under technique "
-        "HALF_ANGLE"));
-  }
-  const HalfAngleAxis half_angle =
-      ComputeHalfAngleAxis(ViewDirection(scene.camera), TravelDirection(source, particles));
-  Traversal traversal;
-  traversal.axis = half_angle.axis;
-  traversal.back_to_front = half_angle.back_to_front;
-  traversal.slices = static_cast<int>(
-      std::clamp<size_t>(particles.size(), 1, static_cast<size_t>(scene.shadow.slices)));
-  traversal.interpolate = scene.shadow.interpolate;
-  traversal.spacing = scene.shadow.spacing;
-  traversal.light_buffer_size = scene.shadow.light_buffer_size;
-  traversal.blur = scene.scatters();
-  traversal.keep_unscattered = traversal.blur && scene.material.physical_scattering;
-  traversal.colored_light_buffer = traversal.blur && source.colored_density();
-  return traversal;
-}
+absl::StatusOr<DrawnFrame> HalfAngle::Draw(const DrawContext& context) const {
+  const Scene& scene = context.request.scene;
+  const FramePlan& plan = context.plan;
+  if (absl::Status status = CheckTargetSize(plan, context.device); !status.ok()) return status;
+  gl::ForgetErrors();
 
-std::vector<PlannedPass> HalfAngle::DescribePasses(const Traversal& traversal) const {
-  const std::string light = absl::StrCat("light ", *traversal.shadow_light, " casts shadows");
-  const int slices = traversal.slices;
-  std::vector<PlannedPass> passes = {
-      {traversal.back_to_front ? "sort along the half vector, back to front"
-                               : "sort along the half vector, front to back",
-       light, 1},
-      {"project particles for the eye", "every traversal", 1},
-      {"project particles for the light", light, 1},
-  };
-  if (traversal.blur) passes.push_back({"blur light buffer", "the light scatters", slices - 1});
-  if (traversal.interpolate) {
-    passes.push_back({"copy light buffer", "interpolation within slices", slices});
-  }
-  passes.push_back({"deposit slice into light buffer", light, slices});
-  passes.push_back({"composite slice", "the image", slices});
-  if (traversal.keep_layers) passes.push_back({"read back layer", "light layers wanted", slices});
-  return passes;
-}
+  // Bring particles and camera to the device.
+  context.clock.BeginCpu("upload");
+  const ParticleBuffers buffers = UploadParticles(context.particles);
+  const double samples = static_cast<double>(scene.sampling.supersample) /
+                         static_cast<double>(scene.sampling.downsample);
+  Projection eye_projection = EyeProjection(scene.camera, plan.composite_size, samples);
+  eye_projection.near_eye = ReachesEyePlane(eye_projection, context.particles);
+  const TargetProjection eye = UploadProjection(eye_projection, context.particles);
 
-absl::StatusOr<ShadowResult> HalfAngle::Draw(const TraversalContext& context,
-                                             LightReport& report) const {
-  const Traversal& traversal = context.traversal;
-  const Light& source = context.scene.lights[static_cast<size_t>(*traversal.shadow_light)];
-  Gpu& gpu = context.gpu;
-
-  // Sort the particles along the axis, and fit the light's camera to them.
-  context.clock.BeginCpu("sort");
-  const ParticleOrder order = OrderParticles(
-      context.particles, traversal, context.eye.projection.eye() - context.particles.set().origin);
-  context.clock.BeginCpu("light camera");
-  std::optional<Spread> spread;
-  if (traversal.blur) {
-    spread.emplace(context, source,
-                   glm::dot(TravelDirection(source, context.particles), *traversal.axis));
-  }
-  Projection light_projection =
-      LightProjection(source, context.particles, traversal.light_buffer_size,
-                      spread ? spread->Border(context.particles.bounds()) : 0.0);
-  if (const auto& physical = context.scene.material.physical_scattering) {
-    light_projection.optical_depth_scale = ForwardExtinction(*physical);
-  }
-  report.casts_shadows = true;
-  report.light_texture_from_world = light_projection.texture_from_world();
-  report.light_view_from_world = light_projection.view_from_world;
-  report.slice_axis = *traversal.axis;
-  report.slices = traversal.slices;
-  report.back_to_front = traversal.back_to_front;
-
-  // Project them for the eye and for the light.
-  context.clock.BeginGpu("project");
-  const OrderBuffers order_buffers = UploadOrder(order);
-  const TargetProjection light = UploadProjection(light_projection, context.particles);
-  absl::StatusOr<gl::Buffer> eye_splats = ProjectParticles(
-      gpu, context.buffers, order_buffers, context.eye, "project particles for the eye");
-  if (!eye_splats.ok()) return eye_splats.status();
-  absl::StatusOr<gl::Buffer> light_splats = ProjectParticles(
-      gpu, context.buffers, order_buffers, light, "project particles for the light");
-  if (!light_splats.ok()) return light_splats.status();
-
-  // Slice by slice: let the light spread up to the slice, deposit the slice, draw it.
-  context.clock.BeginGpu("light and composite");
-  LightBuffers buffers(traversal);
-  const CompositePass composite =
-      PrepareComposite(context.scene, traversal, order_buffers, context.buffers, context.eye,
-                       *eye_splats, &light, &*light_splats, context.target);
-  const glm::dvec2 texels_per_unit = TexelsPerUnit(light_projection, context.particles);
-  const auto blur = [&](double from, double to) {
-    return BlurLightBuffer(gpu, buffers.before, buffers.scratch,
-                           spread->InTexels(from, to, texels_per_unit), source.shadow_density,
-                           ChannelsOf(traversal));
-  };
-  ShadowResult result;
-  for (size_t s = 0; s + 1 < order.slice_begin.size(); ++s) {
+  // Walk over the particles once for each light that casts shadows, and add up the light.
+  DrawnImages drawn;
+  drawn.transmittance.resize(scene.lights.size());
+  drawn.shadows.resize(scene.lights.size());
+  std::vector<LightReport> reports(scene.lights.size());
+  for (size_t t = 0; t < plan.traversals.size(); ++t) {
     if (context.stop.stop_requested()) return absl::CancelledError("frame cancelled");
-    const uint32_t begin = order.slice_begin[s];
-    const uint32_t end = order.slice_begin[s + 1];
-    if (traversal.blur && s > 0) {
-      if (absl::Status status = blur(order.slice_position[s - 1], order.slice_position[s]);
-          !status.ok()) {
-        return status;
-      }
-    }
-    LightBuffer& deposit_into = traversal.interpolate ? buffers.after : buffers.before;
-    const auto deposit = [&] {
-      return DepositSlice(gpu, order_buffers, *light_splats, light, context.scene.material.profile,
-                          ChannelsOf(traversal), begin, end, deposit_into);
-    };
-    const auto draw = [&] {
-      const SliceLight slice_light{buffers.before, deposit_into};
-      return CompositeSlice(gpu, composite, begin, end, &slice_light, context.target);
-    };
-    // Plain slicing sees the light without its own slice, interpolation the light on both sides.
-    absl::Status status;
-    if (traversal.interpolate) {
-      CopyLightBuffer(buffers.before, buffers.after);
-      status = deposit();
-      status.Update(draw());
-      std::swap(buffers.before, buffers.after);
-    } else {
-      status = draw();
-      status.Update(deposit());
-    }
-    if (!status.ok()) return status;
-    if (traversal.keep_layers) {
-      AppendLayer(ReadLightBuffer(buffers.before, traversal.colored_light_buffer),
-                  result.light_layers);
+    const Traversal& traversal = plan.traversals[t];
+    context.clock.BeginGpu("clear");
+    const CompositeTarget target = MakeCompositeTarget(
+        plan.composite_size, plan.keep_depth && t == 0, traversal.keep_transmittance);
+    const TraversalContext walk{context.gpu, scene,  traversal,     context.particles, buffers,
+                                eye,         target, context.clock, context.stop};
+    if (absl::Status status = DrawTraversal(walk, plan, reports, drawn); !status.ok()) {
+      return status;
     }
   }
-  if (traversal.keep_light_buffer) {
-    // The buffer stands at the middle of the last slice; shown is the light behind all particles.
-    if (traversal.blur) {
-      if (absl::Status status = blur(order.slice_position.back(), order.end_position);
-          !status.ok()) {
-        return status;
-      }
-    }
-    result.light_buffer = ReadLightBuffer(buffers.before, traversal.colored_light_buffer);
-  }
-  return result;
+  if (absl::Status status = gl::CheckErrors("frame"); !status.ok()) return status;
+
+  context.clock.BeginCpu("images");
+  return DrawnFrame{SelectImages(context.request, drawn), std::move(reports)};
 }
 
 }  // namespace halflight

@@ -4,7 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "renderer/techniques/half_angle.h"
+#include "renderer/techniques/half_angle_light.h"
 #include "tests/renderer/test_scene.h"
 
 namespace halflight {

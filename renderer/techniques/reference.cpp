@@ -1,4 +1,4 @@
-#include "renderer/reference_frame.h"
+#include "renderer/techniques/reference.h"
 
 #include <memory>
 #include <string>
@@ -7,6 +7,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "renderer/reference/evaluator.h"
+#include "renderer/stage_clock.h"
 
 namespace halflight {
 
@@ -90,37 +91,34 @@ Image SelectImage(const ImageRequest& request, const Scene& scene,
 
 }  // namespace
 
-absl::StatusOr<FramePlan> PlanReferenceFrame(const FrameRequest& request) {
+absl::Status Reference::Plan(const FrameRequest& request, const ParticleView& /*particles*/,
+                             FramePlan& plan) const {
   if (absl::Status status = CheckOutputs(request.images); !status.ok()) return status;
-  const Scene& scene = request.scene;
-  if (absl::Status status = CheckScene(scene); !status.ok()) return status;
-  FramePlan plan;
-  plan.window_size = {scene.camera.window.width, scene.camera.window.height};
-  plan.composite_size = plan.window_size * scene.sampling.supersample;
+  if (absl::Status status = CheckScene(request.scene); !status.ok()) return status;
   plan.passes.push_back(
       {"evaluate the image model in float64", "technique REFERENCE, on the CPU", 1});
-  return plan;
+  return absl::OkStatus();
 }
 
-absl::StatusOr<FrameResult> RenderReferenceFrame(const FrameRequest& request,
-                                                 const std::stop_token& stop) {
-  const Scene& scene = request.scene;
-  auto evaluator = reference::Evaluator::Create(scene, stop);
+absl::StatusOr<DrawnFrame> Reference::Draw(const DrawContext& context) const {
+  const Scene& scene = context.request.scene;
+  context.clock.BeginCpu("reference");
+  auto evaluator = reference::Evaluator::Create(scene, context.stop);
   if (!evaluator.ok()) return evaluator.status();
   reference::EvaluateOptions options;
-  options.stop = stop;
+  options.stop = context.stop;
   const absl::StatusOr<reference::PixelValues> values = (*evaluator)->EvaluateWindow(options);
   if (!values.ok()) return values.status();
-  FrameResult result;
-  for (const ImageRequest& image : request.images) {
-    result.images.push_back(SelectImage(image, scene, *values));
+  DrawnFrame frame;
+  for (const ImageRequest& image : context.request.images) {
+    frame.images.push_back(SelectImage(image, scene, *values));
   }
   for (const Light& light : scene.lights) {
     LightReport report;
     report.casts_shadows = light.casts_shadows();
-    result.lights.push_back(report);
+    frame.reports.push_back(report);
   }
-  return result;
+  return frame;
 }
 
 }  // namespace halflight

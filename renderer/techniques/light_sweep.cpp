@@ -1,10 +1,12 @@
-#include "renderer/sweep/sweep_frame.h"
+#include "renderer/techniques/light_sweep.h"
 
 #include <optional>
 #include <string>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "renderer/frame_images.h"
+#include "renderer/stage_clock.h"
 #include "renderer/sweep/compositor.h"
 #include "renderer/sweep/light_fit.h"
 #include "renderer/sweep/resample.h"
@@ -52,8 +54,9 @@ bool Shows(const FrameRequest& request, ImageKind kind) {
 
 }  // namespace
 
-absl::Status PlanSweepFrame(const FrameRequest& request, const ParticleView& particles,
-                            FramePlan& plan) {
+absl::Status LightSweep::Plan(const FrameRequest& request, const ParticleView& particles,
+                              FramePlan& plan) const {
+  if (absl::Status status = CheckLightCount(request.scene); !status.ok()) return status;
   if (absl::Status status = CheckRequest(request); !status.ok()) return status;
   const std::vector<Light>& lights = request.scene.lights;
   for (size_t l = 0; l < lights.size(); ++l) {
@@ -74,15 +77,17 @@ absl::Status PlanSweepFrame(const FrameRequest& request, const ParticleView& par
   return absl::OkStatus();
 }
 
-absl::StatusOr<DrawnImages> DrawSweepFrame(const FrameRequest& request,
-                                           const ParticleView& particles, const FramePlan& plan,
-                                           StageClock& clock, const std::stop_token& stop,
-                                           std::vector<LightReport>& reports) {
+absl::StatusOr<DrawnFrame> LightSweep::Draw(const DrawContext& context) const {
+  const FrameRequest& request = context.request;
+  const ParticleView& particles = context.particles;
+  const FramePlan& plan = context.plan;
+  StageClock& clock = context.clock;
   const Scene& scene = request.scene;
   const size_t lights = scene.lights.size();
   DrawnImages drawn;
   drawn.transmittance.resize(lights);
   drawn.shadows.resize(lights);
+  std::vector<LightReport> reports(lights);
 
   // Sweep every light that casts shadows through the particles.
   clock.BeginCpu("light");
@@ -92,7 +97,7 @@ absl::StatusOr<DrawnImages> DrawSweepFrame(const FrameRequest& request,
     if (!scene.lights[l].casts_shadows()) continue;
     absl::StatusOr<sweep::LightFit> fit =
         sweep::FitLight(scene.lights[l], particles, scene.material.profile,
-                        scene.shadow.light_buffer_size, scene.shadow.fit_degree, stop);
+                        scene.shadow.light_buffer_size, scene.shadow.fit_degree, context.stop);
     if (!fit.ok()) return fit.status();
     reports[l].casts_shadows = true;
     reports[l].light_texture_from_world = fit->projection.texture_from_world();
@@ -114,8 +119,8 @@ absl::StatusOr<DrawnImages> DrawSweepFrame(const FrameRequest& request,
       sweep::ShadeSprites(scene, particles, eye, list, fit_of, scene.shadow.fit_degree,
                           plan.keep_depth, keep_transmittance);
   clock.BeginCpu("composite");
-  absl::StatusOr<sweep::Composite> composite =
-      sweep::CompositeTiles(list, shading, eye, scene.material.profile, keep_transmittance, stop);
+  absl::StatusOr<sweep::Composite> composite = sweep::CompositeTiles(
+      list, shading, eye, scene.material.profile, keep_transmittance, context.stop);
   if (!composite.ok()) return composite.status();
 
   const auto resample = [&](Image image) {
@@ -130,7 +135,8 @@ absl::StatusOr<DrawnImages> DrawSweepFrame(const FrameRequest& request,
       drawn.transmittance[l] = resample(composite->transmittance[slot]);
     }
   }
-  return drawn;
+  clock.BeginCpu("images");
+  return DrawnFrame{SelectImages(request, drawn), std::move(reports)};
 }
 
 }  // namespace halflight

@@ -1,0 +1,17 @@
+// Frames of the light sweep, on the CPU: particles in their exact order along each light, shadows
+// fitted over every footprint, the image composited front to back tile by tile. Uses all cores and
+// no GL. Refuses scattering, light layers, and a shadow-casting light among the particles.
+#pragma once
+
+#include "renderer/shadow_technique.h"
+
+namespace halflight {
+
+class LightSweep : public ShadowTechnique {
+ public:
+  absl::Status Plan(const FrameRequest& request, const ParticleView& particles,
+                    FramePlan& plan) const override;
+  [[nodiscard]] absl::StatusOr<DrawnFrame> Draw(const DrawContext& context) const override;
+};
+
+}  // namespace halflight
