@@ -35,8 +35,24 @@ HALFLIGHT_INLINE Floats Sqrt(const Floats& x) {
   return root;
 }
 
-HALFLIGHT_INLINE float Sum(const Floats& x) {
-  return ((x[0] + x[4]) + (x[1] + x[5])) + ((x[2] + x[6]) + (x[3] + x[7]));
+// The sums of eight vectors' lanes, in their order.
+HALFLIGHT_INLINE Floats SumsOf(const Floats* x) {
+  Floats pairs[4];
+  for (int i = 0; i < 4; ++i) {
+    const Floats& a = x[2 * i];
+    const Floats& b = x[2 * i + 1];
+    pairs[i] = __builtin_shufflevector(a, b, 0, 8, 2, 10, 4, 12, 6, 14) +
+               __builtin_shufflevector(a, b, 1, 9, 3, 11, 5, 13, 7, 15);
+  }
+  Floats fours[2];
+  for (int i = 0; i < 2; ++i) {
+    const Floats& a = pairs[2 * i];
+    const Floats& b = pairs[2 * i + 1];
+    fours[i] = __builtin_shufflevector(a, b, 0, 1, 8, 9, 4, 5, 12, 13) +
+               __builtin_shufflevector(a, b, 2, 3, 10, 11, 6, 7, 14, 15);
+  }
+  return __builtin_shufflevector(fours[0], fours[1], 0, 1, 2, 3, 8, 9, 10, 11) +
+         __builtin_shufflevector(fours[0], fours[1], 4, 5, 6, 7, 12, 13, 14, 15);
 }
 
 // 2^n and f q(f), of which exp(-x) = 2^n (1 + f q(f)), for x in [-41, 87] and these bounds beyond:
