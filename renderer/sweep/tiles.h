@@ -34,6 +34,9 @@ struct TileLists {
   std::vector<uint32_t> part_begin;
 };
 
+// The tiles, those with the most entries first: where there are few, the cores end together.
+std::vector<uint32_t> LongestFirst(const TileLists& lists);
+
 // Uses all cores. Targets of at most 65535 pixels along a side.
 TileLists ListTiles(const std::vector<Rect>& rects, const glm::ivec2& target_size, int tile_size);
 
