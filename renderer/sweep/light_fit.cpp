@@ -24,7 +24,7 @@ absl::StatusOr<LightFit> FitLight(const Light& light, const ParticleView& partic
 
   // Sweep every tile through its particles.
   const auto terms = static_cast<size_t>(Terms(degree));
-  std::vector<float> moments(tiles.entries.size() * 2 * terms);
+  Block<float> moments(tiles.entries.size() * 2 * terms);
   const TargetShape shape{fit.projection.orthographic, profile == Profile::kBall};
   const std::vector<uint32_t> longest_first = LongestFirst(tiles);
   const bool done = ForTiles(longest_first.size(), stop, [&](size_t turn) {

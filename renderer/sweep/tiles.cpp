@@ -44,7 +44,7 @@ std::vector<uint32_t> LongestFirst(const TileLists& lists) {
   return tiles;
 }
 
-TileLists ListTiles(const std::vector<Rect>& rects, const glm::ivec2& target_size, int tile_size) {
+TileLists ListTiles(const Block<Rect>& rects, const glm::ivec2& target_size, int tile_size) {
   TileLists lists;
   lists.tiles = (target_size + (tile_size - 1)) / tile_size;
   const auto tile_count = static_cast<size_t>(lists.tiles.x) * lists.tiles.y;
