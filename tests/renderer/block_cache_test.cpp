@@ -14,7 +14,8 @@ constexpr size_t kMebi = size_t{1} << 20U;
 // Of a block that is given back at once.
 uintptr_t PlaceOf(size_t bytes) {
   const Block<char> block(bytes);
-  return reinterpret_cast<uintptr_t>(block.data());
+  const auto place = reinterpret_cast<uintptr_t>(block.data());
+  return place;
 }
 
 class BlockCacheOf : public testing::Test {
