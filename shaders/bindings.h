@@ -26,6 +26,7 @@ HALFLIGHT_CONSTANT(kParticlesBinding, 1);
 HALFLIGHT_CONSTANT(kCompositeBinding, 2);
 HALFLIGHT_CONSTANT(kBlurBinding, 3);
 HALFLIGHT_CONSTANT(kResolveBinding, 4);
+HALFLIGHT_CONSTANT(kScanBinding, 5);
 
 // Storage buffers.
 HALFLIGHT_CONSTANT(kOrderBinding, 0);          // OrderedParticle[]
@@ -36,6 +37,11 @@ HALFLIGHT_CONSTANT(kColorsBinding, 4);         // float[3 N]
 HALFLIGHT_CONSTANT(kEmissionsBinding, 5);      // float[3 N]
 HALFLIGHT_CONSTANT(kSplatsBinding, 6);         // Splat[N], as the eye sees the particles
 HALFLIGHT_CONSTANT(kLightSplatsBinding, 7);    // Splat[N], as the light does
+
+// Those of a prefix sum.
+HALFLIGHT_CONSTANT(kScanValuesBinding, 0);     // uint[N]
+HALFLIGHT_CONSTANT(kScanPrefixBinding, 1);     // uint[N + 1]
+HALFLIGHT_CONSTANT(kScanBlockSumsBinding, 2);  // uint[blocks]
 
 // Textures.
 HALFLIGHT_CONSTANT(kLightBeforeBinding, 0);  // light buffer without the current slice
@@ -64,6 +70,8 @@ HALFLIGHT_CONSTANT(kShadowLightVariesConstant, 17);
 HALFLIGHT_CONSTANT(kUnscatteredLightConstant, 18);
 
 HALFLIGHT_CONSTANT(kProjectGroupSize, 64);
+HALFLIGHT_CONSTANT(kScanGroupSize, 256);
+HALFLIGHT_CONSTANT(kScanPerInvocation, 8);
 HALFLIGHT_CONSTANT(kMaxLightsInTraversal, 16);
 HALFLIGHT_CONSTANT(kMaxBlurRadius, 63);  // texels to each side
 
@@ -127,6 +135,12 @@ struct BlurBlock {
 
 struct ResolveBlock {
   uvec4 factor;  // x: samples (or pixels, when enlarging) along each side
+};
+
+// The part of a prefix sum that one dispatch sees.
+struct ScanBlock {
+  uvec4 count;   // x: values, y: sums
+  uvec4 blocks;  // x: of this part, y: before it
 };
 
 #undef HALFLIGHT_CONSTANT
