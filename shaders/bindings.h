@@ -27,6 +27,7 @@ HALFLIGHT_CONSTANT(kCompositeBinding, 2);
 HALFLIGHT_CONSTANT(kBlurBinding, 3);
 HALFLIGHT_CONSTANT(kResolveBinding, 4);
 HALFLIGHT_CONSTANT(kScanBinding, 5);
+HALFLIGHT_CONSTANT(kSortBinding, 6);
 
 // Storage buffers.
 HALFLIGHT_CONSTANT(kOrderBinding, 0);          // OrderedParticle[]
@@ -42,6 +43,12 @@ HALFLIGHT_CONSTANT(kLightSplatsBinding, 7);    // Splat[N], as the light does
 HALFLIGHT_CONSTANT(kScanValuesBinding, 0);     // uint[N]
 HALFLIGHT_CONSTANT(kScanPrefixBinding, 1);     // uint[N + 1]
 HALFLIGHT_CONSTANT(kScanBlockSumsBinding, 2);  // uint[blocks]
+// Those of a sort.
+HALFLIGHT_CONSTANT(kSortKeysBinding, 0);      // uint[N]
+HALFLIGHT_CONSTANT(kSortValuesBinding, 1);    // uint[N]
+HALFLIGHT_CONSTANT(kSortTableBinding, 2);     // uint[digits * blocks + 1]
+HALFLIGHT_CONSTANT(kSortedKeysBinding, 3);    // uint[N]
+HALFLIGHT_CONSTANT(kSortedValuesBinding, 4);  // uint[N]
 
 // Textures.
 HALFLIGHT_CONSTANT(kLightBeforeBinding, 0);  // light buffer without the current slice
@@ -68,10 +75,13 @@ HALFLIGHT_CONSTANT(kColoredDensityConstant, 15);
 HALFLIGHT_CONSTANT(kVaryingLightsConstant, 16);
 HALFLIGHT_CONSTANT(kShadowLightVariesConstant, 17);
 HALFLIGHT_CONSTANT(kUnscatteredLightConstant, 18);
+HALFLIGHT_CONSTANT(kNumberItemsConstant, 19);
 
 HALFLIGHT_CONSTANT(kProjectGroupSize, 64);
 HALFLIGHT_CONSTANT(kScanGroupSize, 256);
 HALFLIGHT_CONSTANT(kScanPerInvocation, 8);
+HALFLIGHT_CONSTANT(kSortGroupSize, 256);  // and digits a pass
+HALFLIGHT_CONSTANT(kSortRounds, 16);
 HALFLIGHT_CONSTANT(kMaxLightsInTraversal, 16);
 HALFLIGHT_CONSTANT(kMaxBlurRadius, 63);  // texels to each side
 
@@ -141,6 +151,11 @@ struct ResolveBlock {
 struct ScanBlock {
   uvec4 count;   // x: values, y: sums
   uvec4 blocks;  // x: of this part, y: before it
+};
+
+// A pass of a radix sort.
+struct SortBlock {
+  uvec4 pass;  // x: items, y: the digit's lowest bit, z: blocks
 };
 
 #undef HALFLIGHT_CONSTANT

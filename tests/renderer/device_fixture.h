@@ -26,7 +26,7 @@ class DeviceTest : public testing::Test {
         ADD_FAILURE() << context.status();
         std::abort();
       }
-      return std::make_unique<Holder>(*std::move(context));
+      return std::unique_ptr<Holder>(new Holder{*std::move(context), {}});
     }();
     return holder->gpu;
   }
