@@ -5,8 +5,12 @@
 #include <cstddef>
 
 #include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
 
+#include "absl/status/statusor.h"
 #include "renderer/gl/object.h"
+#include "renderer/gpu.h"
+#include "renderer/projection.h"
 #include "renderer/sweep/sprites.h"
 #include "renderer/sweep/tiles.h"
 
@@ -31,6 +35,31 @@ struct DeviceTiles {
   gl::Buffer entries;  // uint: place, ascending within a tile
   size_t entry_count = 0;
 };
+
+// Places [first, end) of an order.
+struct PlaceRun {
+  size_t first = 0;
+  size_t end = 0;
+};
+
+// ListSprites() of particles on the device, whose offsets are from `origin`. In the same steps of
+// float64, so that order, sprites and rectangles are the CPU's, bit for bit where the device rounds
+// divisions and roots as IEEE 754 asks and depths are no denormal floats: at any distance from the
+// origin. Sorts there too. 28 bytes a particle, 44 with near ones; 16 more while it works. Waits
+// once for the device, to see whether any are near, unless the target is orthographic.
+// ResourceExhausted where a storage block does not hold the positions: beyond 11 million particles
+// where it holds the 128 MiB that GL asks for. All else is bound in parts. Needs a current context.
+absl::StatusOr<DeviceSprites> ListDeviceSprites(Gpu& gpu, const ParticleBuffers& particles,
+                                                const glm::dvec3& origin, const Projection& target,
+                                                double near_depth = 0.0);
+
+// ListTiles() of a run of places, entry for entry the CPU's; entries are places of the whole order.
+// Waits once for the device, for the number of entries. 4 bytes an entry and a tile; 12 an entry
+// and 4 a place more while it works. ResourceExhausted where a storage block does not hold 4 bytes
+// an entry or 8 a place: shorter runs then fit. Needs a current context.
+absl::StatusOr<DeviceTiles> ListDeviceTiles(Gpu& gpu, const DeviceSprites& sprites,
+                                            const PlaceRun& run, const glm::ivec2& target_size,
+                                            int tile_size);
 
 // Copy lists made on the CPU. Need a current context.
 DeviceSprites UploadSprites(const SpriteList& list);
