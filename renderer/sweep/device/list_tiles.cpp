@@ -109,7 +109,7 @@ absl::StatusOr<DeviceTiles> ListDeviceTiles(Gpu& gpu, const DeviceSprites& sprit
   if (absl::Status status = Run(gpu, EntriesProgram(), block, lists.entry_count); !status.ok()) {
     return status;
   }
-  const int tile_bits = std::max<int>(std::bit_width(tile_count - 1), 1);
+  const int tile_bits = std::max(static_cast<int>(std::bit_width(tile_count - 1)), 1);
   absl::StatusOr<KeyedValues> sorted =
       SortKeys(gpu, std::move(entries), lists.entry_count, tile_bits);
   if (!sorted.ok()) return sorted.status();
