@@ -30,8 +30,8 @@ dvec2 VisibleSlopes(double x, double w, double r) {
   precise double tangent = sqrt(tangent_squared);
   precise dvec2 low = dvec2(x * tangent - w * r, w * tangent + x * r);
   precise dvec2 high = dvec2(x * tangent + w * r, w * tangent - x * r);
-  return dvec2(low.y > 0.0 ? low.x / low.y : x > 0.0 ? kInfinity : -kInfinity,
-               high.y > 0.0 ? high.x / high.y : x < 0.0 ? -kInfinity : kInfinity);
+  return dvec2(low.y > 0.0 ? low.x / low.y : -kInfinity,
+               high.y > 0.0 ? high.x / high.y : kInfinity);
 }
 
 uvec2 RectOf(dvec2 xs, dvec2 ys) {

@@ -14,8 +14,9 @@ namespace halflight::sweep {
 
 namespace {
 
-// TangentSlopes where the disc reaches w <= 0: only what lies at w > 0 counts. The tangents are the
-// direction to the centre turned by the angle whose sine is r and whose cosine is their length.
+// TangentSlopes of a disc that reaches both w > 0, of which alone it tells, and w <= 0, where a
+// tangent bounds nothing. The tangents' directions are the centre's, turned by the angle whose sine
+// is as r and whose cosine as their length.
 glm::dvec2 VisibleSlopes(double x, double w, double r) {
   constexpr double kInfinity = 1e30;
   const double tangent_squared = x * x + (w - r) * (w + r);
@@ -23,8 +24,7 @@ glm::dvec2 VisibleSlopes(double x, double w, double r) {
   const double tangent = std::sqrt(tangent_squared);
   const glm::dvec2 low(x * tangent - w * r, w * tangent + x * r);
   const glm::dvec2 high(x * tangent + w * r, w * tangent - x * r);
-  return {low.y > 0.0 ? low.x / low.y : (x > 0.0 ? kInfinity : -kInfinity),
-          high.y > 0.0 ? high.x / high.y : (x < 0.0 ? -kInfinity : kInfinity)};
+  return {low.y > 0.0 ? low.x / low.y : -kInfinity, high.y > 0.0 ? high.x / high.y : kInfinity};
 }
 
 Rect RectOf(const Projection& target, const glm::dvec2& xs, const glm::dvec2& ys) {
