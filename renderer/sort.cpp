@@ -29,6 +29,7 @@ struct Digit {
 struct KeyRange {
   uint32_t low = std::numeric_limits<uint32_t>::max();
   uint32_t high = 0;
+  uint32_t varying = 0;  // bits in which some keys differ
 };
 
 KeyRange RangeOf(std::span<const uint32_t> keys) {
@@ -38,6 +39,7 @@ KeyRange RangeOf(std::span<const uint32_t> keys) {
     for (size_t i = range.begin; i < range.end; ++i) {
       seen.low = std::min(seen.low, keys[i]);
       seen.high = std::max(seen.high, keys[i]);
+      seen.varying |= keys[i] ^ keys[0];
     }
     by_worker[range.worker] = seen;
   });
@@ -45,19 +47,23 @@ KeyRange RangeOf(std::span<const uint32_t> keys) {
   for (const KeyRange& part : by_worker) {
     all.low = std::min(all.low, part.low);
     all.high = std::max(all.high, part.high);
+    all.varying |= part.varying;
   }
   return all;
 }
 
-// As few digits as cover the keys' span, all of about the same size: small ones scatter faster.
-std::vector<Digit> DigitsOf(uint32_t span) {
-  const auto bits = static_cast<int>(std::bit_width(span));
+// Of keys less the lowest: as few digits as cover the bits that differ, all of about the same size,
+// since small ones scatter faster.
+std::vector<Digit> DigitsOf(const KeyRange& range) {
+  if (range.varying == 0) return {};
+  const int first = std::countr_zero(range.varying);
+  const auto bits = static_cast<int>(std::bit_width(range.high - range.low)) - first;
   const int count = (bits + kMaxDigitBits - 1) / kMaxDigitBits;
   std::vector<Digit> digits;
   for (int d = 0; d < count; ++d) {
     const int begin = bits * d / count;
     const int end = bits * (d + 1) / count;
-    digits.push_back({begin, (1U << (end - begin)) - 1U});
+    digits.push_back({first + begin, (1U << (end - begin)) - 1U});
   }
   return digits;
 }
@@ -104,7 +110,7 @@ std::vector<uint32_t> SortedOrder(std::span<const uint32_t> keys) {
   std::vector<uint32_t> order(count);
   if (count == 0) return order;
   const KeyRange range = RangeOf(keys);
-  const std::vector<Digit> digits = DigitsOf(range.high - range.low);
+  const std::vector<Digit> digits = DigitsOf(range);
   if (digits.empty()) {
     std::iota(order.begin(), order.end(), 0U);
     return order;

@@ -57,6 +57,16 @@ TEST(SortedOrder, IsTheStableSortOfKeysOfAnySpan) {
   }
 }
 
+// As depths on a grid have them.
+TEST(SortedOrder, IsTheStableSortOfKeysWhoseLowBitsAreTheSame) {
+  for (const uint32_t step : {2U, 0x800U, 0x1000U, 0x80000000U}) {
+    std::mt19937 random(step);
+    std::vector<uint32_t> keys(40000);
+    for (uint32_t& key : keys) key = static_cast<uint32_t>(random()) / step * step + step / 3;
+    EXPECT_TRUE(SortedOrder(keys) == StableOrder(keys)) << step;
+  }
+}
+
 INSTANTIATE_TEST_SUITE_P(Sizes, SortedOrderOf,
                          testing::Values(0, 1, 2, 1000, 16383, 16384, 32768, 32769, 200001));
 
