@@ -185,6 +185,7 @@ struct SpriteTargetBlock {
   dvec4 size;                // xy: pixels; z: radii below this are drawn as this (plane units)
   dvec4 near_depths;         // in radii; x: of near particles, y: of those that may reach the eye
   uvec4 run;                 // x: places that one dispatch lists
+  uvec4 padding;             // to a multiple of a dvec4
 };
 
 // Which entries of tile lists one dispatch makes.

@@ -27,7 +27,7 @@ const gl::ProgramSource& ListProgram() {
 
 shader::SpriteTargetBlock BlockOf(const Projection& target, const glm::dvec3& origin,
                                   double near_depth) {
-  shader::SpriteTargetBlock block;
+  shader::SpriteTargetBlock block{};
   for (int column = 0; column < 3; ++column) {
     block.view_from_world[column] = target.view_from_world[column];
   }
@@ -35,7 +35,6 @@ shader::SpriteTargetBlock BlockOf(const Projection& target, const glm::dvec3& or
   block.pixel_from_plane = glm::dvec4(target.pixel_from_plane, target.pixel_offset);
   block.size = glm::dvec4(target.size, target.least_radius, 0.0);
   block.near_depths = glm::dvec4(std::max(near_depth, kLeastNearDepth), kLeastNearDepth, 0.0, 0.0);
-  block.run = glm::uvec4(0U);
   return block;
 }
 

@@ -45,10 +45,11 @@ struct PlaceRun {
 // ListSprites() of particles on the device, whose offsets are from `origin`. In the same steps of
 // float64, so that order, sprites and rectangles are the CPU's, bit for bit where the device rounds
 // divisions and roots as IEEE 754 asks and depths are no denormal floats: at any distance from the
-// origin. Sorts there too. 28 bytes a particle, 44 with near ones; 16 more while it works. Waits
+// origin. Sorts there too. 28 bytes a particle, 44 with near ones; 4 more while it works. Waits
 // once for the device, to see whether any are near, unless the target is orthographic.
 // ResourceExhausted where a storage block does not hold the positions: beyond 11 million particles
-// where it holds the 128 MiB that GL asks for. All else is bound in parts. Needs a current context.
+// where it holds the 128 MiB that GL asks for. Larger lists are bound in parts. Needs a current
+// context.
 absl::StatusOr<DeviceSprites> ListDeviceSprites(Gpu& gpu, const ParticleBuffers& particles,
                                                 const glm::dvec3& origin, const Projection& target,
                                                 double near_depth = 0.0);
