@@ -1,13 +1,20 @@
-// Runs a function over ranges on all cores; leaves scheduling to the system.
+// Runs a function over ranges on all cores, whose threads wait between calls. Knows no priorities.
 #pragma once
 
 #include <algorithm>
 #include <cstddef>
 #include <functional>
 #include <thread>
-#include <vector>
 
 namespace halflight {
+
+// Calls `task` once for each of [0, count), on this thread and on those of the cores that have
+// nothing else to do, and returns when all have finished. Any thread, several at once, and from
+// within a task: whoever calls does itself what no other thread takes. `task` must not throw. The
+// threads start with the first call that needs them, and end with the process.
+void RunOnCores(size_t count, const std::function<void(size_t)>& task);
+
+inline size_t CoreCount() { return std::max(1U, std::thread::hardware_concurrency()); }
 
 // The worker that ParallelRanges gives a range to, and the range.
 struct WorkRange {
@@ -19,21 +26,16 @@ struct WorkRange {
 // How many ranges ParallelRanges makes of `count` items: a core is worth waking for 16,384 of them.
 inline size_t WorkerCount(size_t count) {
   constexpr size_t kLeastItems = 16384;
-  const size_t cores = std::max(1U, std::thread::hardware_concurrency());
-  return std::clamp<size_t>(count / kLeastItems, 1, cores);
+  return std::clamp<size_t>(count / kLeastItems, 1, CoreCount());
 }
 
 // Calls `work` for consecutive ranges that together cover [0, count), one a worker, and returns
-// when all have finished. `work` must not throw.
+// when all have finished. As RunOnCores otherwise.
 inline void ParallelRanges(size_t count, const std::function<void(const WorkRange&)>& work) {
   const size_t workers = WorkerCount(count);
-  std::vector<std::jthread> threads;
-  for (size_t worker = 1; worker < workers; ++worker) {
-    threads.emplace_back([&work, worker, workers, count] {
-      work({worker, count * worker / workers, count * (worker + 1) / workers});
-    });
-  }
-  work({0, 0, count / workers});
+  RunOnCores(workers, [&](size_t worker) {
+    work({worker, count * worker / workers, count * (worker + 1) / workers});
+  });
 }
 
 }  // namespace halflight

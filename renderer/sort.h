@@ -13,7 +13,9 @@ uint32_t OrderedKey(float value);
 
 // The permutation that sorts `keys` ascending: result[k] is the index of the k-th smallest. Stable
 // (equal keys keep the order of their indices), so the same input gives the same output on any
-// number of cores. Least-significant-digit radix sort, 11 bits a digit.
+// number of cores. Least-significant-digit radix sort, in as few digits of at most 11 bits as
+// cover those in which keys differ. renderer/passes/sort_keys.h sorts on the device, to the same
+// order.
 std::vector<uint32_t> SortedOrder(std::span<const uint32_t> keys);
 
 }  // namespace halflight

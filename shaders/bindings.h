@@ -11,6 +11,7 @@
 #include <glm/vec4.hpp>
 
 namespace halflight::shader {
+using glm::dvec4;
 using glm::mat4;
 using glm::uvec4;
 using glm::vec4;
@@ -26,6 +27,10 @@ HALFLIGHT_CONSTANT(kParticlesBinding, 1);
 HALFLIGHT_CONSTANT(kCompositeBinding, 2);
 HALFLIGHT_CONSTANT(kBlurBinding, 3);
 HALFLIGHT_CONSTANT(kResolveBinding, 4);
+HALFLIGHT_CONSTANT(kScanBinding, 5);
+HALFLIGHT_CONSTANT(kSortBinding, 6);
+HALFLIGHT_CONSTANT(kSpriteTargetBinding, 7);
+HALFLIGHT_CONSTANT(kTilesBinding, 8);
 
 // Storage buffers.
 HALFLIGHT_CONSTANT(kOrderBinding, 0);          // OrderedParticle[]
@@ -36,6 +41,30 @@ HALFLIGHT_CONSTANT(kColorsBinding, 4);         // float[3 N]
 HALFLIGHT_CONSTANT(kEmissionsBinding, 5);      // float[3 N]
 HALFLIGHT_CONSTANT(kSplatsBinding, 6);         // Splat[N], as the eye sees the particles
 HALFLIGHT_CONSTANT(kLightSplatsBinding, 7);    // Splat[N], as the light does
+
+// Those of a prefix sum.
+HALFLIGHT_CONSTANT(kScanValuesBinding, 0);     // uint[N]
+HALFLIGHT_CONSTANT(kScanPrefixBinding, 1);     // uint[N + 1]
+HALFLIGHT_CONSTANT(kScanBlockSumsBinding, 2);  // uint[blocks]
+// Those of a sort.
+HALFLIGHT_CONSTANT(kSortKeysBinding, 0);      // uint[N]
+HALFLIGHT_CONSTANT(kSortValuesBinding, 1);    // uint[N]
+HALFLIGHT_CONSTANT(kSortTableBinding, 2);     // uint[digits * blocks + 1]
+HALFLIGHT_CONSTANT(kSortedKeysBinding, 3);    // uint[N]
+HALFLIGHT_CONSTANT(kSortedValuesBinding, 4);  // uint[N]
+// Those of a list of sprites, beside the particles' own.
+HALFLIGHT_CONSTANT(kSpriteKeysBinding, 4);   // uint[N]
+HALFLIGHT_CONSTANT(kAnyNearBinding, 5);      // uint
+HALFLIGHT_CONSTANT(kSpriteOrderBinding, 0);  // uint[N]
+HALFLIGHT_CONSTANT(kSpritesBinding, 4);      // vec4[N]
+HALFLIGHT_CONSTANT(kSpriteRectsBinding, 5);  // uvec2[N]
+HALFLIGHT_CONSTANT(kNearSpritesBinding, 6);  // vec4[N]
+// Those of tile lists.
+HALFLIGHT_CONSTANT(kTileRectsBinding, 0);    // uvec2[N]
+HALFLIGHT_CONSTANT(kEntryBeginsBinding, 1);  // uint[N + 1]
+HALFLIGHT_CONSTANT(kEntryTilesBinding, 2);   // uint[entries]
+HALFLIGHT_CONSTANT(kEntryPlacesBinding, 3);  // uint[entries]
+HALFLIGHT_CONSTANT(kTileBeginsBinding, 4);   // uint[tiles + 1]
 
 // Textures.
 HALFLIGHT_CONSTANT(kLightBeforeBinding, 0);  // light buffer without the current slice
@@ -62,8 +91,15 @@ HALFLIGHT_CONSTANT(kColoredDensityConstant, 15);
 HALFLIGHT_CONSTANT(kVaryingLightsConstant, 16);
 HALFLIGHT_CONSTANT(kShadowLightVariesConstant, 17);
 HALFLIGHT_CONSTANT(kUnscatteredLightConstant, 18);
+HALFLIGHT_CONSTANT(kNumberItemsConstant, 19);
+HALFLIGHT_CONSTANT(kHasNearConstant, 20);
 
 HALFLIGHT_CONSTANT(kProjectGroupSize, 64);
+HALFLIGHT_CONSTANT(kScanGroupSize, 256);
+HALFLIGHT_CONSTANT(kScanPerInvocation, 8);
+HALFLIGHT_CONSTANT(kSortGroupSize, 256);  // and digits a pass
+HALFLIGHT_CONSTANT(kSortRounds, 16);
+HALFLIGHT_CONSTANT(kListGroupSize, 256);
 HALFLIGHT_CONSTANT(kMaxLightsInTraversal, 16);
 HALFLIGHT_CONSTANT(kMaxBlurRadius, 63);  // texels to each side
 
@@ -127,6 +163,36 @@ struct BlurBlock {
 
 struct ResolveBlock {
   uvec4 factor;  // x: samples (or pixels, when enlarging) along each side
+};
+
+// The part of a prefix sum that one dispatch sees.
+struct ScanBlock {
+  uvec4 count;   // x: values, y: sums
+  uvec4 blocks;  // x: of this part, y: before it
+};
+
+// A pass of a radix sort.
+struct SortBlock {
+  uvec4 pass;  // x: items, y: the digit's lowest bit, z: blocks
+};
+
+// What a list of sprites is seen from, in float64: depths then order particles as they do on the
+// CPU.
+struct SpriteTargetBlock {
+  dvec4 view_from_world[3];  // columns of the rotation (xyz)
+  dvec4 origin_from_eye;     // xyz, world axes
+  dvec4 pixel_from_plane;    // xy: scale, zw: offset
+  dvec4 size;                // xy: pixels; z: radii below this are drawn as this (plane units)
+  dvec4 near_depths;         // in radii; x: of near particles, y: of those that may reach the eye
+  uvec4 run;                 // x: places that one dispatch lists
+  uvec4 padding;             // to a multiple of a dvec4
+};
+
+// Which entries of tile lists one dispatch makes.
+struct TilesBlock {
+  uvec4 tiles;    // xy: across and down, z: pixels along a side
+  uvec4 run;      // x: first place in the bound rectangles, y: places, z: first place
+  uvec4 entries;  // x
 };
 
 #undef HALFLIGHT_CONSTANT

@@ -71,8 +71,8 @@ Buffer MakeBuffer(const char* label, std::span<const std::byte> contents);
 // The same without contents: only the GPU writes it.
 Buffer MakeBuffer(const char* label, size_t bytes);
 
-template <typename T>
-Buffer MakeBuffer(const char* label, const std::vector<T>& values) {
+template <typename T, typename Allocator>
+Buffer MakeBuffer(const char* label, const std::vector<T, Allocator>& values) {
   return MakeBuffer(label, std::as_bytes(std::span(values)));
 }
 template <typename T>

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
-#include <numbers>
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
@@ -15,22 +14,17 @@ namespace halflight::sweep {
 
 namespace {
 
-// Radii from the plane through the eye within which a particle may reach it, as rounding goes.
-constexpr double kLeastNearDepth = 1.0005;
-
-// TangentSlopes where the disc reaches w <= 0: only what lies at w > 0 counts.
+// TangentSlopes of a disc that reaches both w > 0, of which alone it tells, and w <= 0, where a
+// tangent bounds nothing. The tangents' directions are the centre's, turned by the angle whose sine
+// is as r and whose cosine as their length.
 glm::dvec2 VisibleSlopes(double x, double w, double r) {
   constexpr double kInfinity = 1e30;
-  constexpr double kHalfPi = 0.5 * std::numbers::pi;
-  const double distance = std::hypot(x, w);
-  if (distance <= r) return {-kInfinity, kInfinity};
-  const double middle = std::atan2(x, w);
-  const double half_angle = std::asin(r / distance);
-  const auto slope = [](double angle) {
-    if (angle <= -kHalfPi) return -kInfinity;
-    return angle >= kHalfPi ? kInfinity : std::tan(angle);
-  };
-  return {slope(middle - half_angle), slope(middle + half_angle)};
+  const double tangent_squared = x * x + (w - r) * (w + r);
+  if (tangent_squared <= 0.0) return {-kInfinity, kInfinity};
+  const double tangent = std::sqrt(tangent_squared);
+  const glm::dvec2 low(x * tangent - w * r, w * tangent + x * r);
+  const glm::dvec2 high(x * tangent + w * r, w * tangent - x * r);
+  return {low.y > 0.0 ? low.x / low.y : -kInfinity, high.y > 0.0 ? high.x / high.y : kInfinity};
 }
 
 Rect RectOf(const Projection& target, const glm::dvec2& xs, const glm::dvec2& ys) {
@@ -56,13 +50,19 @@ SpriteList ListSprites(const ParticleView& particles, const Projection& target, 
     return rotation * (glm::dvec3(particles.positions()[i]) + origin_from_eye);
   };
 
+  // Particles smaller than a light buffer can show are enlarged.
+  const auto drawn_radius = [&](size_t i, double w) {
+    const double least = target.least_radius * (target.orthographic ? 1.0 : std::max(w, 0.0));
+    return std::max<double>(particles.radius(i), least);
+  };
+
   // Sort by depth.
   Block<uint32_t> keys(count);
   std::atomic<bool> has_near = false;
   ParallelRanges(count, [&](const WorkRange& range) {
     for (size_t i = range.begin; i < range.end; ++i) {
       const glm::dvec3 view = view_of(i);
-      if (-view.z <= near_depth * particles.radius(i)) has_near = true;
+      if (-view.z <= near_depth * drawn_radius(i, -view.z)) has_near = true;
       keys[i] =
           OrderedKey(static_cast<float>(target.orthographic ? -view.z : glm::dot(view, view)));
     }
@@ -79,14 +79,10 @@ SpriteList ListSprites(const ParticleView& particles, const Projection& target, 
       const uint32_t i = list.particles[place];
       const glm::dvec3 view = view_of(i);
       const double w = -view.z;
-      double radius = particles.radius(i);
-      double optical_depth = particles.optical_depth(i);
-      // Particles smaller than a light buffer can show are enlarged, and keep their integral.
-      const double least = target.least_radius * (target.orthographic ? 1.0 : std::max(w, 0.0));
-      if (radius < least) {
-        optical_depth *= (radius / least) * (radius / least);
-        radius = least;
-      }
+      const double radius = drawn_radius(i, w);
+      // Enlarged particles keep their integral.
+      const double shrink = particles.radius(i) / radius;
+      const double optical_depth = particles.optical_depth(i) * (shrink * shrink);
       if (target.orthographic) {
         if (w <= 0.0) continue;
         list.sprites[place] = {static_cast<float>(view.x), static_cast<float>(view.y),

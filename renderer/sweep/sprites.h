@@ -20,6 +20,9 @@ struct SpriteList {
   std::vector<NearSprite> near;
 };
 
+// Radii from the plane through the eye within which a particle may reach it, as rounding goes.
+inline constexpr double kLeastNearDepth = 1.0005;
+
 // Depth is the distance of a centre along an orthographic target's axis, else from its eye.
 // Particles are near whose depth is at most `near_depth` radii, and those that reach the plane
 // through the eye.

@@ -46,6 +46,7 @@ std::vector<uint32_t> LongestFirst(const TileLists& lists) {
 
 TileLists ListTiles(const Block<Rect>& rects, const glm::ivec2& target_size, int tile_size) {
   TileLists lists;
+  lists.tile_size = tile_size;
   lists.tiles = (target_size + (tile_size - 1)) / tile_size;
   const auto tile_count = static_cast<size_t>(lists.tiles.x) * lists.tiles.y;
   const size_t workers = WorkerCount(rects.size());

@@ -29,6 +29,7 @@ struct TileEntry {
 
 struct TileLists {
   glm::ivec2 tiles{0};
+  int tile_size = 0;  // pixels along each side
   // Tile t (row by row) has entries [begin[t], begin[t + 1]), by ascending item.
   std::vector<size_t> begin;
   Block<TileEntry> entries;

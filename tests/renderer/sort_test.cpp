@@ -23,6 +23,14 @@ TEST(OrderedKey, OrdersAsFloatsDo) {
 
 TEST(OrderedKey, TakesNegativeZeroAsZero) { EXPECT_EQ(OrderedKey(-0.0F), OrderedKey(0.0F)); }
 
+std::vector<uint32_t> StableOrder(const std::vector<uint32_t>& keys) {
+  std::vector<uint32_t> order(keys.size());
+  std::iota(order.begin(), order.end(), 0U);
+  std::stable_sort(order.begin(), order.end(),
+                   [&](uint32_t a, uint32_t b) { return keys[a] < keys[b]; });
+  return order;
+}
+
 class SortedOrderOf : public testing::TestWithParam<size_t> {};
 
 TEST_P(SortedOrderOf, IsTheStableSortOfItsKeys) {
@@ -33,11 +41,29 @@ TEST_P(SortedOrderOf, IsTheStableSortOfItsKeys) {
     std::vector<uint32_t> keys(GetParam());
     for (uint32_t& key : keys)
       key = static_cast<uint32_t>(random()) % distinct * (distinct == 7U ? 613566756U : 1U);
-    std::vector<uint32_t> expected(keys.size());
-    std::iota(expected.begin(), expected.end(), 0U);
-    std::stable_sort(expected.begin(), expected.end(),
-                     [&](uint32_t a, uint32_t b) { return keys[a] < keys[b]; });
-    EXPECT_EQ(SortedOrder(keys), expected);
+    EXPECT_EQ(SortedOrder(keys), StableOrder(keys));
+  }
+}
+
+// Both sides of what one, two and three digits hold, at the ends of what a key may be.
+TEST(SortedOrder, IsTheStableSortOfKeysOfAnySpan) {
+  for (const uint32_t span : {0U, 1U, 0x7FFU, 0x800U, 0x3FFFFFU, 0x400000U, 0xFFFFFFFEU}) {
+    for (const uint32_t lowest : {0U, 0xFFFFFFFFU - span}) {
+      std::mt19937 random(span);
+      std::vector<uint32_t> keys(40000);
+      for (uint32_t& key : keys) key = lowest + static_cast<uint32_t>(random() % (span + 1ULL));
+      EXPECT_TRUE(SortedOrder(keys) == StableOrder(keys)) << lowest << " + " << span;
+    }
+  }
+}
+
+// As depths on a grid have them.
+TEST(SortedOrder, IsTheStableSortOfKeysWhoseLowBitsAreTheSame) {
+  for (const uint32_t step : {2U, 0x800U, 0x1000U, 0x80000000U}) {
+    std::mt19937 random(step);
+    std::vector<uint32_t> keys(40000);
+    for (uint32_t& key : keys) key = static_cast<uint32_t>(random()) / step * step + step / 3;
+    EXPECT_TRUE(SortedOrder(keys) == StableOrder(keys)) << step;
   }
 }
 
