@@ -1,6 +1,7 @@
 // A frame's way through the renderer: what is asked, and what comes back.
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -13,9 +14,17 @@
 
 namespace halflight {
 
+// Where frames of the light sweep are drawn.
+enum class SweepOn : uint8_t {
+  kAuto,  // on the device, unless it is a CPU in disguise or cannot hold the frame
+  kCpu,
+  kDevice,
+};
+
 struct FrameRequest {
   Scene scene;
   std::vector<ImageRequest> images;
+  SweepOn sweep_on = SweepOn::kAuto;
 };
 
 // What a tool needs to place one light's buffer in the world; see LightInfo in frame.proto.

@@ -31,6 +31,10 @@ HALFLIGHT_CONSTANT(kScanBinding, 5);
 HALFLIGHT_CONSTANT(kSortBinding, 6);
 HALFLIGHT_CONSTANT(kSpriteTargetBinding, 7);
 HALFLIGHT_CONSTANT(kTilesBinding, 8);
+HALFLIGHT_CONSTANT(kPlaceRunBinding, 9);
+HALFLIGHT_CONSTANT(kInverseGramBinding, 10);
+HALFLIGHT_CONSTANT(kShadeBinding, 11);
+HALFLIGHT_CONSTANT(kTileCompositeBinding, 12);
 
 // Storage buffers.
 HALFLIGHT_CONSTANT(kOrderBinding, 0);          // OrderedParticle[]
@@ -65,6 +69,34 @@ HALFLIGHT_CONSTANT(kEntryBeginsBinding, 1);  // uint[N + 1]
 HALFLIGHT_CONSTANT(kEntryTilesBinding, 2);   // uint[entries]
 HALFLIGHT_CONSTANT(kEntryPlacesBinding, 3);  // uint[entries]
 HALFLIGHT_CONSTANT(kTileBeginsBinding, 4);   // uint[tiles + 1]
+// Those of the light sweep; by place: nearest the light first.
+HALFLIGHT_CONSTANT(kLightSpritesBinding, 0);      // vec4[N]: x, y, scale, optical depth
+HALFLIGHT_CONSTANT(kLightRectsBinding, 1);        // uvec2[N]: begin | end << 16 along x, along y
+HALFLIGHT_CONSTANT(kPatchOffsetsBinding, 2);      // uint[N]: within a group of places
+HALFLIGHT_CONSTANT(kGroupOffsetsBinding, 3);      // uint[groups], modulo 2^32; before: texels
+HALFLIGHT_CONSTANT(kPatchesBinding, 4);           // float[]: each particle's rectangle, row by row
+HALFLIGHT_CONSTANT(kLightTileBeginBinding, 5);    // uint[tiles + 1]
+HALFLIGHT_CONSTANT(kLightTileEntriesBinding, 6);  // uint[]: places
+HALFLIGHT_CONSTANT(kLightDepthBinding, 7);        // float[texels], row by row
+// Those of its fit, beside the first five.
+HALFLIGHT_CONSTANT(kLightParticlesBinding, 5);  // uint[N]: index of the particle in its set
+HALFLIGHT_CONSTANT(kFittedDepthBinding, 6);     // float[terms * N], by particle
+HALFLIGHT_CONSTANT(kFittedSpritesBinding, 7);   // vec4[N], by particle
+// Those of the light sweep's shading; beside them, those of the particles.
+HALFLIGHT_CONSTANT(kEyeParticlesBinding, 0);  // uint[count]: index in the set, by place
+HALFLIGHT_CONSTANT(kEyeNearBinding, 3);       // vec4[count], by place
+HALFLIGHT_CONSTANT(kFitDepthBinding, 4);      // float[terms * N]
+HALFLIGHT_CONSTANT(kFitSpritesBinding, 5);    // vec4[N]
+HALFLIGHT_CONSTANT(kEyeSpritesBinding, 6);    // vec4[count], by place
+HALFLIGHT_CONSTANT(kShadedBinding, 7);        // what the pass writes, by place
+// Those of the tile compositor.
+HALFLIGHT_CONSTANT(kTileHeadsBinding, 0);    // vec4[], as shade_sprites.comp writes them
+HALFLIGHT_CONSTANT(kTileLightsBinding, 1);   // float[], as shade_light.comp writes them
+HALFLIGHT_CONSTANT(kTileBeginBinding, 2);    // uint[tiles + 1]
+HALFLIGHT_CONSTANT(kTileEntriesBinding, 3);  // uint[]: places
+
+// Images.
+HALFLIGHT_CONSTANT(kTileTargetBinding, 0);  // premultiplied
 
 // Textures.
 HALFLIGHT_CONSTANT(kLightBeforeBinding, 0);  // light buffer without the current slice
@@ -93,13 +125,34 @@ HALFLIGHT_CONSTANT(kShadowLightVariesConstant, 17);
 HALFLIGHT_CONSTANT(kUnscatteredLightConstant, 18);
 HALFLIGHT_CONSTANT(kNumberItemsConstant, 19);
 HALFLIGHT_CONSTANT(kHasNearConstant, 20);
+HALFLIGHT_CONSTANT(kLightTileSizeConstant, 21);
+HALFLIGHT_CONSTANT(kFitDegreeConstant, 22);
+HALFLIGHT_CONSTANT(kTileColumnsConstant, 30);
+HALFLIGHT_CONSTANT(kTileRowsConstant, 31);
+HALFLIGHT_CONSTANT(kTileChunkConstant, 32);
+HALFLIGHT_CONSTANT(kTileLightsConstant, 33);
+HALFLIGHT_CONSTANT(kTileShowsConstant, 34);
+
+// Values of kTileShowsConstant: what the tile compositor makes an image of.
+HALFLIGHT_CONSTANT(kShowsColor, 0);
+HALFLIGHT_CONSTANT(kShowsDepth, 1);
+HALFLIGHT_CONSTANT(kShowsTransmittance, 2);
 
 HALFLIGHT_CONSTANT(kProjectGroupSize, 64);
+HALFLIGHT_CONSTANT(kShadeGroupSize, 64);
+HALFLIGHT_CONSTANT(kMaxLightsInTiles, 32);
 HALFLIGHT_CONSTANT(kScanGroupSize, 256);
 HALFLIGHT_CONSTANT(kScanPerInvocation, 8);
 HALFLIGHT_CONSTANT(kSortGroupSize, 256);  // and digits a pass
 HALFLIGHT_CONSTANT(kSortRounds, 16);
 HALFLIGHT_CONSTANT(kListGroupSize, 256);
+// Texels in the patches of one run, at most: 64 MiB. Keeps the loops over them below the 65,535
+// iterations after which llvmpipe ends those of an invocation, and sums of 256 below 2^32.
+HALFLIGHT_CONSTANT(kMaxPatchTexels, 0xFFFFFFu);
+HALFLIGHT_CONSTANT(kSweepChunk, 64);    // particles that a light tile loads at once
+HALFLIGHT_CONSTANT(kFitGroupSize, 128);
+HALFLIGHT_CONSTANT(kFitTeamSize, 8);    // invocations that fit a particle of few rows
+HALFLIGHT_CONSTANT(kMaxGramWords, 196);  // vec4: 28 terms squared
 HALFLIGHT_CONSTANT(kMaxLightsInTraversal, 16);
 HALFLIGHT_CONSTANT(kMaxBlurRadius, 63);  // texels to each side
 
@@ -155,6 +208,17 @@ struct CompositeBlock {
   LightBlock lights[kMaxLightsInTraversal];  // that vary; the one that casts shadows is the first
 };
 
+// A run of the light's order.
+struct PlaceRunBlock {
+  uvec4 run;  // places [x, y); z: texels along each side of the light buffer; w: of its patches,
+              // where the first begins among all, modulo 2^32
+};
+
+// Of the monomials over the disc: sweep/polynomial.h.
+struct InverseGramBlock {
+  vec4 rows[kMaxGramWords];  // terms by terms floats
+};
+
 struct BlurBlock {
   uvec4 axis;                        // x, y: step in texels; z: radius in texels
   vec4 density;                      // rgb shadow density of the light
@@ -174,6 +238,23 @@ struct ScanBlock {
 // A pass of a radix sort.
 struct SortBlock {
   uvec4 pass;  // x: items, y: the digit's lowest bit, z: blocks
+};
+
+// The light sweep's shading: of all lights, or of one.
+struct ShadeBlock {
+  mat4 light_view_from_view;  // rotation only; of a light that casts shadows
+  LightBlock light;           // a light that varies
+  vec4 albedo;                // rgb; w: phase g
+  vec4 emission;              // rgb
+  vec4 constant_light;        // rgb; unshadowed and the same everywhere, ambient included
+  vec4 density;               // rgb shadow density
+  uvec4 range;                // x: places; y: the light's slot, z: slots
+};
+
+struct TileCompositeBlock {
+  uvec4 walk;   // entries of each tile's list: x: the first, y: how many; z: first shaded place
+  uvec4 slots;  // x: the first that is shown, y: of each particle
+  vec4 colors[kMaxLightsInTiles];  // by slot: rgb; w: least exponent
 };
 
 // What a list of sprites is seen from, in float64: depths then order particles as they do on the

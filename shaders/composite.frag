@@ -10,6 +10,7 @@
 // own contribution left out.
 // Blending: front to back ONE_MINUS_DST_ALPHA, ONE; back to front ONE, ONE_MINUS_SRC_ALPHA.
 #include "bindings.h"
+#include "radiance.glsl"
 #include "splat.glsl"
 
 layout(constant_id = kShadowedConstant) const bool kShadowed = false;
@@ -17,7 +18,6 @@ layout(constant_id = kPointShadowLightConstant) const bool kPointShadowLight = f
 layout(constant_id = kInterpolateConstant) const bool kInterpolate = false;
 layout(constant_id = kColoredLightBufferConstant) const bool kColoredLightBuffer = false;
 layout(constant_id = kColoredDensityConstant) const bool kColoredDensity = false;
-layout(constant_id = kPhaseConstant) const bool kPhase = false;
 layout(constant_id = kVaryingLightsConstant) const uint kVaryingLights = 0;
 // Whether the shadow casting light is the first of those that vary.
 layout(constant_id = kShadowLightVariesConstant) const bool kShadowLightVaries = false;
@@ -66,23 +66,6 @@ vec3 OpticalDepthOfLight(vec3 offset) {
   return before + optics.z * max(others, 0.0);
 }
 
-// Henyey and Greenstein 1941, without its 1 / (4 pi), so that g = 0 gives 1.
-float PhaseFunction(vec3 light_travel, vec3 ray) {
-  float g = albedo.w;
-  float cosine = dot(light_travel, -ray);
-  float d = 1.0 + g * g - 2.0 * g * cosine;
-  return (1.0 - g * g) / (d * sqrt(d));
-}
-
-// Radiance of a light that varies, at a point in view space.
-vec3 RadianceAt(LightBlock source, vec3 at, vec3 ray) {
-  vec3 travel = source.vector.w != 0.0 ? at - source.vector.xyz : source.vector.xyz;
-  vec3 radiance = source.color.rgb;
-  if (source.color.w != 0.0) radiance /= dot(travel, travel);
-  if (kPhase) radiance *= PhaseFunction(normalize(travel), normalize(ray));
-  return radiance;
-}
-
 void main() {
   bool general = kNearEye && optics.y != 0.0;
   Encounter e = MeetParticle(gl_FragCoord.xy, center, general);
@@ -101,7 +84,8 @@ void main() {
                                       : center.z * vec3(center.xy, -1.0);
   vec3 at = center_in_view + e.offset;
   for (uint l = 0u; l < kVaryingLights; ++l) {
-    vec3 radiance = RadianceAt(composite.lights[l], at, e.ray);
+    vec3 radiance = composite.lights[l].color.rgb *
+                    RadianceFactor(composite.lights[l], albedo.w, at, e.ray);
     light += kShadowLightVaries && l == 0u ? radiance * shadow : radiance;
   }
   image = vec4((albedo.rgb * light + emission.rgb) * alpha, alpha);

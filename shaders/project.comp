@@ -49,9 +49,8 @@ void main() {
   float optical_depth = kHasOpticalDepths ? optical_depths[i] : particles.uniforms.y;
   optical_depth *= projection.target_size.w;
 
-  vec3 offset = vec3(positions[3u * i], positions[3u * i + 1u], positions[3u * i + 2u]) +
-                projection.near_translation.xyz;
-  vec3 view = mat3(projection.view_from_world) * offset + projection.far_translation.xyz;
+  vec3 view =
+      ViewFromOffset(vec3(positions[3u * i], positions[3u * i + 1u], positions[3u * i + 2u]));
   float w = -view.z;
 
   // A light buffer cannot show particles smaller than its texels: enlarge them, keeping the

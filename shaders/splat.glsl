@@ -9,6 +9,12 @@ layout(constant_id = kBallProfileConstant) const bool kBallProfile = false;
 
 layout(std140, binding = kProjectionBinding) uniform Projections { ProjectionBlock projection; };
 
+// From an offset from the particle set's origin.
+vec3 ViewFromOffset(vec3 offset) {
+  return mat3(projection.view_from_world) * (offset + projection.near_translation.xyz) +
+         projection.far_translation.xyz;
+}
+
 // Where a ray passes a particle.
 struct Encounter {
   float rho_squared;  // squared impact parameter over squared radius

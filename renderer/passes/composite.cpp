@@ -23,19 +23,6 @@ const gl::ProgramSource& CompositeProgram() {
   return source;
 }
 
-shader::LightBlock DescribeLight(const Light& light, const glm::dmat4& view_from_world) {
-  shader::LightBlock block;
-  block.color = glm::vec4(light.color, 0.0F);
-  if (const auto* directional = std::get_if<DirectionalLight>(&light.kind)) {
-    block.vector = glm::vec4(glm::dmat3(view_from_world) * directional->direction, 0.0F);
-  } else {
-    const auto& point = std::get<PointLight>(light.kind);
-    block.vector = view_from_world * glm::dvec4(point.position, 1.0);
-    block.color.w = point.inverse_square_falloff ? 1.0F : 0.0F;
-  }
-  return block;
-}
-
 // The lights of a traversal, as the shader wants them: what is the same everywhere summed up.
 struct TraversalLights {
   glm::vec3 constant{0.0F};

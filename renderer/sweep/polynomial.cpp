@@ -113,6 +113,18 @@ DiscFit::DiscFit(Profile profile, int degree) : terms_(Terms(degree)) {
   }
 }
 
+std::vector<double> DiscFit::inverse_gram() const {
+  std::vector<double> dense(static_cast<size_t>(terms_) * static_cast<size_t>(terms_), 0.0);
+  size_t entry = 0;
+  for (size_t i = 0; i < static_cast<size_t>(terms_); ++i) {
+    for (; entry < row_end_[i]; ++entry) {
+      dense[i * static_cast<size_t>(terms_) + inverse_gram_[entry].column] =
+          inverse_gram_[entry].value;
+    }
+  }
+  return dense;
+}
+
 void DiscFit::Fit(std::span<const float> weights, std::span<const float> values,
                   std::span<float> polynomial) const {
   std::array<double, Terms(kMaxDegree)> centered = {};

@@ -123,22 +123,40 @@ LightAxes AxesOf(const LightFit& fit, uint32_t particle, double optical_depth,
 
 Rgb ToRgb(const glm::vec3& color) { return {color.x, color.y, color.z}; }
 
-std::vector<TileLight> ListLights(const Scene& scene, const std::vector<const LightFit*>& fits,
-                                  bool keep_transmittance) {
+}  // namespace
+
+std::vector<TileLight> ListTileLights(const Scene& scene, bool keep_transmittance) {
   std::vector<TileLight> lights;
+  std::vector<TileLight> for_transmittance;
   for (size_t l = 0; l < scene.lights.size(); ++l) {
+    const bool shadowed = scene.lights[l].casts_shadows();
     const bool varies = RadianceVaries(scene.lights[l], scene.material);
     const auto index = static_cast<int>(l);
-    if (fits[l] != nullptr || varies) lights.push_back({index, fits[l], varies, true});
+    if (shadowed || varies) lights.push_back({index, shadowed, varies, true});
     // Its exponent holds more than the shadow: the transmittance wants one of its own.
-    if (fits[l] != nullptr && varies && keep_transmittance) {
-      lights.push_back({index, fits[l], false, false});
+    if (shadowed && varies && keep_transmittance) {
+      for_transmittance.push_back({index, true, false, false});
     }
   }
+  lights.insert(lights.end(), for_transmittance.begin(), for_transmittance.end());
   return lights;
 }
 
-}  // namespace
+int TransmittanceSlot(const std::vector<TileLight>& lights, int light) {
+  int slot = 0;
+  for (size_t i = 0; i < lights.size(); ++i) {
+    if (lights[i].light == light) slot = static_cast<int>(i);  // the last: without variation
+  }
+  return slot;
+}
+
+glm::vec3 ConstantLight(const Scene& scene) {
+  glm::vec3 constant = scene.material.ambient;
+  for (const Light& light : scene.lights) {
+    if (!light.casts_shadows() && !RadianceVaries(light, scene.material)) constant += light.color;
+  }
+  return constant;
+}
 
 ShadedSprites Shading::View(const SpriteList& list) const {
   ShadedSprites view;
@@ -157,14 +175,6 @@ ShadedSprites Shading::View(const SpriteList& list) const {
   return view;
 }
 
-int Shading::SlotOf(int light) const {
-  int slot = 0;
-  for (size_t i = 0; i < lights.size(); ++i) {
-    if (lights[i].light == light) slot = static_cast<int>(i);  // the last: without variation
-  }
-  return slot;
-}
-
 double NearDepth(const Scene& scene) {
   constexpr double kWide = 8.0;
   constexpr double kSteep = 2.0;  // nearer, the linear form is ill-conditioned
@@ -181,23 +191,22 @@ Shading ShadeSprites(const Scene& scene, const ParticleView& particles, const Pr
   const ParticleSet& set = particles.set();
   const size_t count = list.sprites.size();
   Shading shading;
-  shading.lights = ListLights(scene, fits, keep_transmittance);
+  shading.lights = ListTileLights(scene, keep_transmittance);
   shading.degree = degree;
-  glm::vec3 constant = material.ambient;
+  const glm::vec3 constant = ConstantLight(scene);
+  std::vector<const LightFit*> fit_of;  // by slot
   std::vector<RadianceFactor> factors;
   std::vector<glm::dmat3> rotations;
   for (const TileLight& light : shading.lights) {
     const Light& source = scene.lights[static_cast<size_t>(light.light)];
-    shading.exponents = source.colored_density() && light.fit != nullptr ? 3 : shading.exponents;
+    const LightFit* const fit = fits[static_cast<size_t>(light.light)];
+    fit_of.push_back(fit);
+    shading.exponents = source.colored_density() && fit != nullptr ? 3 : shading.exponents;
     shading.shadow_alone[factors.size()] = !light.varies;
     factors.emplace_back(source, material, eye.view_from_world);
-    rotations.push_back(light.fit == nullptr ? glm::dmat3(1.0)
-                                             : glm::dmat3(light.fit->projection.view_from_world) *
-                                                   glm::transpose(glm::dmat3(eye.view_from_world)));
-  }
-  for (size_t l = 0; l < scene.lights.size(); ++l) {
-    if (fits[l] == nullptr && !RadianceVaries(scene.lights[l], material))
-      constant += scene.lights[l].color;
+    rotations.push_back(fit == nullptr ? glm::dmat3(1.0)
+                                       : glm::dmat3(fit->projection.view_from_world) *
+                                             glm::transpose(glm::dmat3(eye.view_from_world)));
   }
 
   const size_t lights = shading.lights.size();
@@ -264,12 +273,12 @@ Shading ShadeSprites(const Scene& scene, const ParticleView& particles, const Pr
 
         float* const own = &shading.exponent[(place * lights + l) * exponents * terms];
         const LightAxes axes =
-            light.fit == nullptr ? LightAxes{}
-                                 : AxesOf(*light.fit, i, particles.optical_depth(i), rotations[l]);
+            fit_of[l] == nullptr ? LightAxes{}
+                                 : AxesOf(*fit_of[l], i, particles.optical_depth(i), rotations[l]);
         for (size_t e = 0; e < exponents; ++e) {
           const std::span<float> out(own + e * terms, terms);
-          if (light.fit != nullptr) {
-            const std::span<const float> depth(&light.fit->depth[i * terms], terms);
+          if (fit_of[l] != nullptr) {
+            const std::span<const float> depth(&fit_of[l]->depth[i * terms], terms);
             const double density = source.shadow_density[static_cast<glm::length_t>(e)];
             if (near) {
               for (size_t t = 0; t < terms; ++t) out[t] = static_cast<float>(density * depth[t]);

@@ -16,11 +16,19 @@ namespace halflight::sweep {
 
 // A light among those that the kernels add up.
 struct TileLight {
-  int light = 0;                  // of the scene
-  const LightFit* fit = nullptr;  // null: it casts no shadows
-  bool varies = false;            // its radiance does, with place or ray
-  bool adds = true;               // false: there only for its transmittance
+  int light = 0;          // of the scene
+  bool shadowed = false;  // it casts shadows, and has a fit
+  bool varies = false;    // its radiance does, with place or ray
+  bool adds = true;       // false: there only for its transmittance
 };
+
+// Those of a scene that cast shadows or vary, first all that add to the image. What the others give
+// is in ConstantLight. `keep_transmittance`: an output shows it.
+std::vector<TileLight> ListTileLights(const Scene& scene, bool keep_transmittance);
+// Where the transmittance of a light of the scene is among them.
+int TransmittanceSlot(const std::vector<TileLight>& lights, int light);
+// The same everywhere: ambient light, and that of lights that neither cast shadows nor vary.
+glm::vec3 ConstantLight(const Scene& scene);
 
 // Owns what ShadedSprites points to, but for the sprites.
 struct Shading {
@@ -36,8 +44,6 @@ struct Shading {
   std::vector<NearLight> near_lights;
 
   [[nodiscard]] ShadedSprites View(const SpriteList& list) const;
-  // Where the transmittance of a light of the scene is among `lights`.
-  [[nodiscard]] int SlotOf(int light) const;
 };
 
 // Depth in radii within which a particle fills so wide an angle that its shadow is not taken as

@@ -5,9 +5,11 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "renderer/frame_engine.h"
 #include "renderer/frame_images.h"
 #include "renderer/stage_clock.h"
 #include "renderer/sweep/compositor.h"
+#include "renderer/sweep/device/frame.h"
 #include "renderer/sweep/light_fit.h"
 #include "renderer/sweep/resample.h"
 #include "renderer/sweep/shading.h"
@@ -45,6 +47,11 @@ absl::Status CheckRequest(const FrameRequest& request) {
   return absl::OkStatus();
 }
 
+bool DrawsOnDevice(const DrawContext& context) {
+  const SweepOn where = context.request.sweep_on;
+  return where == SweepOn::kDevice || (where == SweepOn::kAuto && !context.device.software);
+}
+
 bool Shows(const FrameRequest& request, ImageKind kind) {
   for (const ImageRequest& image : request.images) {
     if (image.kind == kind) return true;
@@ -77,7 +84,9 @@ absl::Status LightSweep::Plan(const FrameRequest& request, const ParticleView& p
   return absl::OkStatus();
 }
 
-absl::StatusOr<DrawnFrame> LightSweep::Draw(const DrawContext& context) const {
+namespace {
+
+absl::StatusOr<DrawnFrame> DrawOnCpu(const DrawContext& context) {
   const FrameRequest& request = context.request;
   const ParticleView& particles = context.particles;
   const FramePlan& plan = context.plan;
@@ -131,12 +140,23 @@ absl::StatusOr<DrawnFrame> LightSweep::Draw(const DrawContext& context) const {
   if (keep_transmittance) {
     for (size_t l = 0; l < lights; ++l) {
       if (fit_of[l] == nullptr) continue;
-      const auto slot = static_cast<size_t>(shading.SlotOf(static_cast<int>(l)));
+      const auto slot =
+          static_cast<size_t>(sweep::TransmittanceSlot(shading.lights, static_cast<int>(l)));
       drawn.transmittance[l] = resample(composite->transmittance[slot]);
     }
   }
   clock.BeginCpu("images");
   return DrawnFrame{SelectImages(request, drawn), std::move(reports)};
+}
+
+}  // namespace
+
+absl::StatusOr<DrawnFrame> LightSweep::Draw(const DrawContext& context) const {
+  if (!DrawsOnDevice(context)) return DrawOnCpu(context);
+  absl::StatusOr<DrawnFrame> frame = sweep::DrawOnDevice(context);
+  // What the device cannot hold the CPU can, unless the device was asked for.
+  const bool too_large = absl::IsResourceExhausted(frame.status());
+  return too_large && context.request.sweep_on == SweepOn::kAuto ? DrawOnCpu(context) : frame;
 }
 
 }  // namespace halflight

@@ -1,6 +1,7 @@
-// Frames of the light sweep, on the CPU: particles in their exact order along each light, shadows
-// fitted over every footprint, the image composited front to back tile by tile. Uses all cores and
-// no GL. Refuses scattering, light layers, and a shadow-casting light among the particles.
+// Frames of the light sweep: particles in their exact order along each light, shadows fitted over
+// every footprint, the image composited front to back tile by tile. On a GPU, or on the CPU with
+// all cores and no GL: see SweepOn. Refuses scattering, light layers, and a shadow-casting light
+// among the particles.
 #pragma once
 
 #include "renderer/shadow_technique.h"

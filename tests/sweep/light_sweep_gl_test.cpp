@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <iostream>
 #include <string>
 
@@ -17,6 +18,11 @@ using ::testing::HasSubstr;
 
 class LightSweep : public test::GlTest {
  protected:
+  static FrameResult RenderOnDevice(FrameRequest request) {
+    request.sweep_on = SweepOn::kDevice;
+    return Render(request);
+  }
+
   static double RelativeRmse(const Scene& scene) {
     const Image beauty = RenderBeauty(scene);
     const auto map = ErrorMap(beauty, scene);
@@ -66,6 +72,16 @@ TEST_P(LightSweepOf, IsTheModelWithinItsFit) {
   std::cout << GetParam().name << ": relative RMSE " << error << "\n";
   RecordProperty("relative_rmse", std::to_string(error));
   EXPECT_LT(error, GetParam().bound);
+}
+
+// So that what the CPU's frames are of the model holds for the device's.
+TEST_P(LightSweepOf, IsTheSameOnTheDevice) {
+  Scene scene = PlumeScene();
+  GetParam().change(scene);
+  const double off =
+      test::MaxDifference(RenderOnDevice(test::Beauty(scene)).images.at(0), RenderBeauty(scene));
+  std::cout << GetParam().name << ": " << off << "\n";
+  EXPECT_LT(off, 1e-4);
 }
 
 Light Point(const glm::dvec3& position, bool falloff) {
@@ -162,6 +178,14 @@ TEST_F(LightSweep, RepeatsItselfAndCrops) {
   EXPECT_LT(largest, 2e-5);
 }
 
+TEST_F(LightSweep, RepeatsItselfOnTheDevice) {
+  Scene scene = PlumeScene();
+  scene.shadow.light_buffer_size = 128;
+  const FrameRequest request = test::Beauty(scene);
+  EXPECT_EQ(RenderOnDevice(request).images.at(0).pixels,
+            RenderOnDevice(request).images.at(0).pixels);
+}
+
 TEST_F(LightSweep, ShowsDepthTransmittanceAndLightBufferAsTheModel) {
   Scene scene = PlumeScene();
   scene.material.opacity = 0.05F;
@@ -198,6 +222,38 @@ TEST_F(LightSweep, ShowsDepthTransmittanceAndLightBufferAsTheModel) {
   scene.shadow.technique = ShadowTechniqueKind::kHalfAngle;
   scene.shadow.slices = 4;
   EXPECT_LT(test::MaxDifference(swept, Render({scene, buffer}).images.at(0)), 1e-3);
+}
+
+// Beside the beauty, and with samples that are not pixels. Where little is covered, depth and
+// transmittance are quotients of what little there is.
+TEST_F(LightSweep, ShowsTheSameOnTheDevice) {
+  Scene scene = PlumeScene();
+  scene.shadow.light_buffer_size = 128;
+  scene.material.phase_g = 0.3F;
+  scene.lights.push_back(Point({-2, 2, 2}, true));
+  scene.sampling.downsample = 2;
+  const FrameRequest request{scene,
+                             {{ImageKind::kCoverage},
+                              {ImageKind::kDepth},
+                              {ImageKind::kLightTransmittance, 0},
+                              {ImageKind::kLightTransmittance, 1},
+                              {ImageKind::kLightBuffer, 1}}};
+  const FrameResult device = RenderOnDevice(request);
+  const FrameResult cpu = Render(request);
+  ASSERT_EQ(device.images.size(), cpu.images.size());
+  EXPECT_LT(test::MaxDifference(device.images[4], cpu.images[4]), 1e-5);
+  for (size_t image = 0; image < 4; ++image) {
+    ASSERT_EQ(device.images[image].pixels.size(), cpu.images[image].pixels.size());
+    double largest = 0.0;
+    for (size_t i = 0; i < cpu.images[image].pixels.size(); ++i) {
+      if (cpu.images[0].pixels[i] < 0.01F) continue;
+      const double off = device.images[image].pixels[i] - cpu.images[image].pixels[i];
+      largest = std::isnan(off) ? 1e30 : std::max(largest, std::abs(off));
+    }
+    std::cout << "output " << image << ": " << largest << "\n";
+    EXPECT_LT(largest, 1e-4) << image;
+  }
+  EXPECT_EQ(device.lights[1].light_texture_from_world, cpu.lights[1].light_texture_from_world);
 }
 
 TEST_F(LightSweep, FarFromTheWorldsOriginIsTheSameImage) {
@@ -237,17 +293,50 @@ TEST_F(LightSweep, RefusesWhatItHasNot) {
   }
 }
 
+// Where it was not asked for the CPU draws such frames.
+TEST_F(LightSweep, RefusesOnTheDeviceWhatIsLargerThanItsTextures) {
+  Scene scene = PlumeScene();
+  const int width = Renderer().device().max_texture_size + 1;
+  scene.camera.width = width;
+  scene.camera.window = {0, 60, width, 1};
+  FrameRequest request = test::Beauty(scene);
+  request.sweep_on = SweepOn::kDevice;
+  const auto refused = Renderer().Render(request, {});
+  EXPECT_TRUE(absl::IsResourceExhausted(refused.status())) << refused.status();
+  EXPECT_THAT(refused.status().message(),
+              HasSubstr("camera size times sampling: " + std::to_string(width) + " pixels"));
+  request.sweep_on = SweepOn::kAuto;
+  EXPECT_EQ(Render(request).images.at(0).width, width);
+}
+
 TEST_F(LightSweep, StopsWhenToldTo) {
   std::stop_source stop;
   stop.request_stop();
-  const auto frame = Renderer().Render(test::Beauty(PlumeScene()), stop.get_token());
-  EXPECT_TRUE(absl::IsCancelled(frame.status())) << frame.status();
+  for (const SweepOn where : {SweepOn::kCpu, SweepOn::kDevice}) {
+    FrameRequest request = test::Beauty(PlumeScene());
+    request.sweep_on = where;
+    const auto frame = Renderer().Render(request, stop.get_token());
+    EXPECT_TRUE(absl::IsCancelled(frame.status())) << frame.status();
+  }
 }
 
 TEST_F(LightSweep, OfNothingIsAnEmptyFrame) {
   Scene scene = PlumeScene();
   scene.particles = std::make_shared<ParticleSet>();
   for (const float value : RenderBeauty(scene).pixels) EXPECT_EQ(value, 0.0F);
+  const Image device = RenderOnDevice(test::Beauty(scene)).images.at(0);
+  for (const float value : device.pixels) EXPECT_EQ(value, 0.0F);
+}
+
+// A CPU in the guise of a device is better used as one.
+TEST_F(LightSweep, UsesTheDeviceWhereItIsNoCpu) {
+  Scene scene = PlumeScene();
+  scene.shadow.light_buffer_size = 64;
+  scene.shadow.fit_degree = 2;
+  FrameRequest request = test::Beauty(scene);
+  const Image unasked = Render(request).images.at(0);
+  request.sweep_on = Renderer().device().software ? SweepOn::kCpu : SweepOn::kDevice;
+  EXPECT_EQ(Render(request).images.at(0).pixels, unasked.pixels);
 }
 
 }  // namespace
