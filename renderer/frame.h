@@ -16,6 +16,9 @@ namespace halflight {
 struct FrameRequest {
   Scene scene;
   std::vector<ImageRequest> images;
+  // Whether work that earlier frames left may be used, and left to later ones; the images are the
+  // same. False where times of frames are compared.
+  bool reuse = true;
 };
 
 // What a tool needs to place one light's buffer in the world; see LightInfo in frame.proto.

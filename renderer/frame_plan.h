@@ -46,7 +46,9 @@ struct Traversal {
 struct PlannedPass {
   std::string name;
   std::string reason;
-  int count = 1;
+  int count = 1;  // 0: not run, an earlier frame left what it gives
+
+  bool operator==(const PlannedPass&) const = default;
 };
 
 struct FramePlan {

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <stop_token>
+#include <string>
 #include <vector>
 
 #include "absl/status/status.h"
@@ -12,6 +13,7 @@
 
 namespace halflight {
 
+class FrameCache;
 struct DeviceInfo;
 struct Gpu;
 class StageClock;
@@ -20,6 +22,7 @@ class StageClock;
 struct DrawContext {
   Gpu& gpu;
   const DeviceInfo& device;
+  FrameCache& cache;
   const FrameRequest& request;
   const ParticleView& particles;
   const FramePlan& plan;
@@ -30,6 +33,7 @@ struct DrawContext {
 struct DrawnFrame {
   std::vector<Image> images;         // in the order of the request
   std::vector<LightReport> reports;  // one for each light of the scene
+  std::vector<PlannedPass> reused;   // of the plan: not run, since the cache had what they give
 };
 
 class ShadowTechnique {
@@ -47,7 +51,19 @@ class ShadowTechnique {
 
 const ShadowTechnique& TechniqueFor(ShadowTechniqueKind kind);
 
+// What techniques refuse in the same words, as InvalidArgument. `technique` is the refusing one's
+// name in the service, such as "LIGHT_SWEEP".
+
+// "<field>: <value>, allowed under technique <technique>: <allowed>"
+absl::Status Refuse(const std::string& field, const std::string& value, const char* technique,
+                    const std::string& allowed);
 // For techniques that go over the lights: at most kMaxLights.
 absl::Status CheckLightCount(const Scene& scene);
+// For techniques whose light buffers see the particles through one frustum: no shadow-casting light
+// among them.
+absl::Status CheckLightsOutside(const Scene& scene, const ParticleView& particles,
+                                const char* technique);
+// For techniques that cannot scatter; `reason` says why.
+absl::Status CheckNoScattering(const Scene& scene, const char* technique, const char* reason);
 
 }  // namespace halflight

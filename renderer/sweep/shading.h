@@ -22,9 +22,19 @@ struct TileLight {
   bool adds = true;               // false: there only for its transmittance
 };
 
-// Owns what ShadedSprites points to, but for the sprites.
+// Those that are not the same for every particle. `fits` has one for each light of the scene, null
+// for those that cast no shadows. `keep_transmittance`: an output shows it.
+std::vector<TileLight> ListLights(const Scene& scene, const std::vector<const LightFit*>& fits,
+                                  bool keep_transmittance);
+
+// Which of the listed lights has the transmittance of a light of the scene that casts shadows.
+size_t SlotOf(const std::vector<TileLight>& lights, size_t light);
+
+// Of the sprites of a run of a list, by their place in it. Owns what ShadedSprites points to, but
+// for the sprites.
 struct Shading {
-  std::vector<TileLight> lights;
+  TileRun run;
+  int lights = 0;
   int degree = 0;
   int exponents = 1;
   std::array<bool, kMaxTileLights> shadow_alone = {};
@@ -35,9 +45,8 @@ struct Shading {
   std::vector<float> exponent;
   std::vector<NearLight> near_lights;
 
+  // `list` is the one that the run is of.
   [[nodiscard]] ShadedSprites View(const SpriteList& list) const;
-  // Where the transmittance of a light of the scene is among `lights`.
-  [[nodiscard]] int SlotOf(int light) const;
 };
 
 // Depth in radii within which a particle fills so wide an angle that its shadow is not taken as
@@ -46,10 +55,10 @@ struct Shading {
 // it at their centre.
 double NearDepth(const Scene& scene);
 
-// `fits` has one for each light of the scene, null for those that cast no shadows. `keep_depth` and
-// `keep_transmittance`: an output shows them.
+// `lights` are those listed of the scene, fitted to `degree`. `keep_depth`: an output shows it.
+// Uses all cores.
 Shading ShadeSprites(const Scene& scene, const ParticleView& particles, const Projection& eye,
-                     const SpriteList& list, const std::vector<const LightFit*>& fits, int degree,
-                     bool keep_depth, bool keep_transmittance);
+                     const SpriteList& list, const TileRun& run,
+                     const std::vector<TileLight>& lights, int degree, bool keep_depth);
 
 }  // namespace halflight::sweep

@@ -18,6 +18,11 @@ struct SpriteList {
   // Centres in radii of those near a perspective target's eye, whose scale is 0; empty where there
   // are none.
   std::vector<NearSprite> near;
+
+  [[nodiscard]] size_t bytes() const {
+    return particles.capacity() * sizeof(uint32_t) + sprites.capacity() * sizeof(Sprite) +
+           rects.capacity() * sizeof(Rect) + near.capacity() * sizeof(NearSprite);
+  }
 };
 
 // Depth is the distance of a centre along an orthographic target's axis, else from its eye.
