@@ -59,6 +59,9 @@ struct FramePlan {
   std::vector<PlannedPass> passes;    // what the above comes to, for people
 };
 
+// Samples composited for a window of the image.
+glm::ivec2 CompositeSize(const PixelRect& window, const Sampling& sampling);
+
 // `particles` is the view of request.scene. Fails with InvalidArgument, naming the field, where the
 // scene asks for what its technique cannot do.
 absl::StatusOr<FramePlan> PlanFrame(const FrameRequest& request, const ParticleView& particles);

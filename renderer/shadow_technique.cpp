@@ -23,6 +23,13 @@ const ShadowTechnique& TechniqueFor(ShadowTechniqueKind kind) {
   return half_angle;
 }
 
+ShadowTechniqueKind DefaultTechnique(const FrameRequest& request, bool software_renderer) {
+  const auto sweep = ShadowTechniqueKind::kLightSweep;
+  return software_renderer && TechniqueFor(sweep).Check(request).ok()
+             ? sweep
+             : ShadowTechniqueKind::kHalfAngle;
+}
+
 absl::Status CheckLightCount(const Scene& scene) {
   if (scene.lights.size() <= kMaxLights) return absl::OkStatus();
   return absl::InvalidArgumentError(absl::StrCat("lighting.lights: ", scene.lights.size(),

@@ -40,8 +40,13 @@ class ShadowTechnique {
  public:
   virtual ~ShadowTechnique() = default;
 
-  // Adds to a plan whose sizes are set: what will be drawn, and the passes that it comes to. No GL.
-  // InvalidArgument, naming the field, for what the technique cannot do.
+  // InvalidArgument, naming the field, for what the technique cannot do, whatever the particles. No
+  // GL.
+  [[nodiscard]] virtual absl::Status Check(const FrameRequest& request) const = 0;
+
+  // Adds to the plan of a request that was checked, whose sizes are set: what will be drawn, and
+  // the passes that it comes to. No GL. InvalidArgument, naming the field, for what it cannot do
+  // with these particles.
   virtual absl::Status Plan(const FrameRequest& request, const ParticleView& particles,
                             FramePlan& plan) const = 0;
 
@@ -50,6 +55,12 @@ class ShadowTechnique {
 };
 
 const ShadowTechnique& TechniqueFor(ShadowTechniqueKind kind);
+
+// What draws a request that leaves its technique open, on a device that is a CPU rasteriser or is
+// not: on a CPU the light sweep wherever it can, which is faster there and nearer the image model;
+// otherwise half-angle slicing. On GPUs that stays so until the sweep has been measured on one.
+// `request.scene.shadow.technique` does not matter.
+ShadowTechniqueKind DefaultTechnique(const FrameRequest& request, bool software_renderer);
 
 // What techniques refuse in the same words, as InvalidArgument. `technique` is the refusing one's
 // name in the service, such as "LIGHT_SWEEP".

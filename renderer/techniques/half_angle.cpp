@@ -131,10 +131,13 @@ absl::Status DrawTraversal(const TraversalContext& context, const FramePlan& pla
 
 }  // namespace
 
+absl::Status HalfAngle::Check(const FrameRequest& request) const {
+  return CheckLightCount(request.scene);
+}
+
 absl::Status HalfAngle::Plan(const FrameRequest& request, const ParticleView& particles,
                              FramePlan& plan) const {
   const Scene& scene = request.scene;
-  if (absl::Status status = CheckLightCount(scene); !status.ok()) return status;
   if (absl::Status status = CheckLightsOutside(scene, particles, "HALF_ANGLE"); !status.ok()) {
     return status;
   }

@@ -22,22 +22,6 @@ namespace {
 
 constexpr char kName[] = "LIGHT_SWEEP";
 
-absl::Status CheckRequest(const FrameRequest& request, const FramePlan& plan) {
-  for (const ImageRequest& image : request.images) {
-    if (image.kind == ImageKind::kLightLayers) {
-      return Refuse("outputs", "light layers", kName,
-                    "beauty, coverage, depth, light transmittance, light buffer");
-    }
-  }
-  for (const int side : {plan.composite_size.x, plan.composite_size.y}) {
-    if (side > sweep::kMaxTargetSide) {
-      return Refuse("camera size times sampling", absl::StrCat(side, " pixels"), kName,
-                    absl::StrCat("at most ", sweep::kMaxTargetSide));
-    }
-  }
-  return CheckNoScattering(request.scene, kName, "it has no slices to blur between");
-}
-
 bool Shows(const FrameRequest& request, ImageKind kind) {
   return std::any_of(request.images.begin(), request.images.end(),
                      [kind](const ImageRequest& image) { return image.kind == kind; });
@@ -120,11 +104,24 @@ absl::StatusOr<std::shared_ptr<const sweep::LightFit>> FitOf(const DrawContext& 
 
 }  // namespace
 
+absl::Status LightSweep::Check(const FrameRequest& request) const {
+  const Scene& scene = request.scene;
+  if (absl::Status status = CheckLightCount(scene); !status.ok()) return status;
+  if (Shows(request, ImageKind::kLightLayers)) {
+    return Refuse("outputs", "light layers", kName,
+                  "beauty, coverage, depth, light transmittance, light buffer");
+  }
+  const glm::ivec2 size = CompositeSize(scene.camera.window, scene.sampling);
+  if (std::max(size.x, size.y) > sweep::kMaxTargetSide) {
+    return Refuse("camera size times sampling", absl::StrCat(std::max(size.x, size.y), " pixels"),
+                  kName, absl::StrCat("at most ", sweep::kMaxTargetSide));
+  }
+  return CheckNoScattering(scene, kName, "it has no slices to blur between");
+}
+
 absl::Status LightSweep::Plan(const FrameRequest& request, const ParticleView& particles,
                               FramePlan& plan) const {
   const Scene& scene = request.scene;
-  if (absl::Status status = CheckLightCount(scene); !status.ok()) return status;
-  if (absl::Status status = CheckRequest(request, plan); !status.ok()) return status;
   if (absl::Status status = CheckLightsOutside(scene, particles, kName); !status.ok()) {
     return status;
   }

@@ -75,10 +75,13 @@ Image SelectImage(const ImageRequest& request, const Scene& scene,
 
 }  // namespace
 
-absl::Status Reference::Plan(const FrameRequest& request, const ParticleView& /*particles*/,
-                             FramePlan& plan) const {
+absl::Status Reference::Check(const FrameRequest& request) const {
   if (absl::Status status = CheckOutputs(request.images); !status.ok()) return status;
-  if (absl::Status status = CheckScene(request.scene); !status.ok()) return status;
+  return CheckScene(request.scene);
+}
+
+absl::Status Reference::Plan(const FrameRequest& /*request*/, const ParticleView& /*particles*/,
+                             FramePlan& plan) const {
   plan.passes.push_back(
       {"evaluate the image model in float64", "technique REFERENCE, on the CPU", 1});
   return absl::OkStatus();
