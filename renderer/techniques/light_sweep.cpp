@@ -75,11 +75,11 @@ struct SpriteListKey {
   bool operator==(const SpriteListKey&) const = default;
 };
 
-// Of one run of a list.
+// Of a list that is one run. Those of more take much room, and little time against what else such a
+// frame needs.
 struct TileListsKey {
   using Value = sweep::TileLists;
   SpriteListKey list;
-  size_t run = 0;
 
   bool operator==(const TileListsKey&) const = default;
 };
@@ -184,19 +184,19 @@ absl::StatusOr<DrawnFrame> LightSweep::Draw(const DrawContext& context) const {
                                                     keep_transmittance ? tile_lights.size() : 0);
   const std::vector<sweep::TileRun> runs =
       sweep::CutIntoRuns((*list)->rects, sweep::kImageTile, {});
-  for (size_t run = 0; run < runs.size(); ++run) {
+  FrameCache nothing_kept(0);
+  FrameCache& cache_of_tiles = runs.size() == 1 ? context.cache : nothing_kept;
+  for (const sweep::TileRun& run : runs) {
     clock.BeginCpu("project");
-    const auto tiles = context.cache.FindOrMake(
-        scene.particles, TileListsKey{list_key, run}, [&]() -> absl::StatusOr<sweep::TileLists> {
-          return sweep::ListTiles(
-              std::span((*list)->rects).subspan(runs[run].begin, runs[run].size()), eye.size,
-              sweep::kImageTile);
+    const auto tiles = cache_of_tiles.FindOrMake(
+        scene.particles, TileListsKey{list_key}, [&]() -> absl::StatusOr<sweep::TileLists> {
+          return sweep::ListTiles(std::span((*list)->rects).subspan(run.begin, run.size()),
+                                  eye.size, sweep::kImageTile);
         });
     if (!tiles.ok()) return tiles.status();
     clock.BeginCpu("shade");
-    const sweep::Shading shading =
-        sweep::ShadeSprites(scene, particles, eye, **list, runs[run], tile_lights,
-                            scene.shadow.fit_degree, plan.keep_depth);
+    const sweep::Shading shading = sweep::ShadeSprites(
+        scene, particles, eye, **list, run, tile_lights, scene.shadow.fit_degree, plan.keep_depth);
     clock.BeginCpu("composite");
     if (!sweep::CompositeRun(**list, **tiles, shading, eye, scene.material.profile, context.stop,
                              composite)) {

@@ -16,7 +16,7 @@ namespace {
 Scene MakeScene() {
   Scene scene = test::BallScene(3000, 150);
   test::VaryParticles(scene, 0.1F, 0.3F);
-  scene.camera.view_from_world = glm::translate(scene.camera.view_from_world, {0.0, 0.0, 2.0});
+  scene.camera.view_from_world = glm::translate(scene.camera.view_from_world, {0.0, 0.0, 3.2});
   return scene;
 }
 
