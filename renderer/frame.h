@@ -25,6 +25,9 @@ struct FrameRequest {
   Scene scene;
   std::vector<ImageRequest> images;
   SweepOn sweep_on = SweepOn::kAuto;
+  // Whether work that earlier frames left may be used, and left to later ones; the images are the
+  // same. False where times of frames are compared.
+  bool reuse = true;
 };
 
 // What a tool needs to place one light's buffer in the world; see LightInfo in frame.proto.

@@ -7,11 +7,6 @@ namespace halflight {
 
 namespace {
 
-glm::ivec2 CompositeSize(const PixelRect& window, const Sampling& sampling) {
-  const glm::ivec2 pixels(window.width, window.height);
-  return (pixels * sampling.supersample + (sampling.downsample - 1)) / sampling.downsample;
-}
-
 void DescribeSampling(const Sampling& sampling, FramePlan& plan) {
   if (sampling.supersample > 1) {
     plan.passes.push_back({"average samples", "supersample above 1", 1});
@@ -22,6 +17,11 @@ void DescribeSampling(const Sampling& sampling, FramePlan& plan) {
 }
 
 }  // namespace
+
+glm::ivec2 CompositeSize(const PixelRect& window, const Sampling& sampling) {
+  const glm::ivec2 pixels(window.width, window.height);
+  return (pixels * sampling.supersample + (sampling.downsample - 1)) / sampling.downsample;
+}
 
 absl::StatusOr<FramePlan> PlanFrame(const FrameRequest& request, const ParticleView& particles) {
   const Scene& scene = request.scene;
@@ -37,8 +37,9 @@ absl::StatusOr<FramePlan> PlanFrame(const FrameRequest& request, const ParticleV
   for (const ImageRequest& image : request.images) {
     plan.keep_depth |= image.kind == ImageKind::kDepth;
   }
-  absl::Status status = TechniqueFor(scene.shadow.technique).Plan(request, particles, plan);
-  if (!status.ok()) return status;
+  const ShadowTechnique& technique = TechniqueFor(scene.shadow.technique);
+  if (absl::Status status = technique.Check(request); !status.ok()) return status;
+  if (absl::Status status = technique.Plan(request, particles, plan); !status.ok()) return status;
   DescribeSampling(scene.sampling, plan);
   return plan;
 }

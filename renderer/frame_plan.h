@@ -46,7 +46,9 @@ struct Traversal {
 struct PlannedPass {
   std::string name;
   std::string reason;
-  int count = 1;
+  int count = 1;  // 0: not run, an earlier frame left what it gives
+
+  bool operator==(const PlannedPass&) const = default;
 };
 
 struct FramePlan {
@@ -56,6 +58,9 @@ struct FramePlan {
   std::vector<Traversal> traversals;  // at least one, but for the reference: none
   std::vector<PlannedPass> passes;    // what the above comes to, for people
 };
+
+// Samples composited for a window of the image.
+glm::ivec2 CompositeSize(const PixelRect& window, const Sampling& sampling);
 
 // `particles` is the view of request.scene. Fails with InvalidArgument, naming the field, where the
 // scene asks for what its technique cannot do.

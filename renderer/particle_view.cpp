@@ -1,5 +1,6 @@
 #include "renderer/particle_view.h"
 
+#include <algorithm>
 #include <atomic>
 #include <cmath>
 
@@ -38,11 +39,17 @@ OffsetBounds BoundsOf(const std::vector<glm::vec3>& positions) {
 
 }  // namespace
 
+ParticleViewKey ParticleViewKeyOf(const Scene& scene) {
+  return {scene.time_offset_s, scene.material.radius, scene.material.opacity};
+}
+
 ParticleView::ParticleView(const Scene& scene)
     : set_(scene.particles.get()),
-      positions_(&set_->positions),
       uniform_radius_(scene.material.radius),
-      uniform_optical_depth_(OpticalDepth(scene.material.opacity)) {
+      uniform_optical_depth_(OpticalDepth(scene.material.opacity)),
+      largest_radius_(set_->radii.empty()
+                          ? uniform_radius_
+                          : *std::max_element(set_->radii.begin(), set_->radii.end())) {
   const size_t count = set_->size();
   if (scene.time_offset_s != 0.0) {
     advanced_positions_.resize(count);
@@ -52,7 +59,6 @@ ParticleView::ParticleView(const Scene& scene)
         advanced_positions_[i] = set_->positions[i] + set_->velocities[i] * seconds;
       }
     });
-    positions_ = &advanced_positions_;
   }
   if (set_->opacities.empty()) {
     clamped_opacities_ = scene.material.opacity > kMaxOpacity ? count : 0;
@@ -69,7 +75,7 @@ ParticleView::ParticleView(const Scene& scene)
     });
     clamped_opacities_ = clamped;
   }
-  bounds_ = BoundsOf(*positions_);
+  bounds_ = BoundsOf(positions());
 }
 
 }  // namespace halflight

@@ -127,6 +127,7 @@ shader::ProjectionBlock Projection::block(const ParticleView& particles) const {
   block.pixel_from_plane = glm::vec4(pixel_from_plane, pixel_offset);
   block.plane_from_pixel = glm::vec4(1.0 / pixel_from_plane, -pixel_offset / pixel_from_plane);
   block.target_size = glm::vec4(size, least_radius, optical_depth_scale);
+  block.band = glm::vec4(0.0F, 0.0F, size);
   return block;
 }
 
@@ -179,11 +180,8 @@ Projection LightProjection(const Light& light, const ParticleView& particles, in
   const auto* point = std::get_if<PointLight>(&light.kind);
   // A directional light looks from behind all particles, so that all lie in front of it.
   const glm::dvec3 center = particles.bounds().center();
-  float largest_radius = particles.uniform_radius();
-  for (const float radius : particles.set().radii)
-    largest_radius = std::max(largest_radius, radius);
-  const double reach =
-      glm::length(particles.bounds().high - center) + static_cast<double>(largest_radius);
+  const double reach = glm::length(particles.bounds().high - center) +
+                       static_cast<double>(particles.largest_radius());
   Projection projection;
   projection.orthographic = point == nullptr;
   projection.size = glm::ivec2(size);

@@ -22,6 +22,8 @@ struct Projection {
   double least_radius = 0.0;         // plane units; smaller particles are drawn as large as this
   double optical_depth_scale = 1.0;  // of all particles
 
+  bool operator==(const Projection&) const = default;
+
   // Maps world points to target coordinates: after division by w, (0, 0) is the outer corner of the
   // top left pixel and (1, 1) that of the bottom right one.
   [[nodiscard]] glm::dmat4 texture_from_world() const;

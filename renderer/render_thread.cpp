@@ -9,7 +9,6 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
-#include "renderer/frame_renderer.h"
 
 namespace halflight {
 
@@ -25,7 +24,7 @@ class RenderThread : public FrameEngine {
   RenderThread& operator=(const RenderThread&) = delete;
 
   // Call once; the engine serves when it returned OK.
-  absl::Status Start(const std::string& device);
+  absl::Status Start(const RenderThreadOptions& options);
 
   absl::Status Submit(FrameRequest request, std::stop_token stop, Done done) override;
   [[nodiscard]] const DeviceInfo& device() const override { return device_; }
@@ -38,7 +37,7 @@ class RenderThread : public FrameEngine {
     Clock::time_point submitted;
   };
 
-  void Run(const std::string& device, std::promise<absl::StatusOr<DeviceInfo>> started);
+  void Run(const RenderThreadOptions& options, std::promise<absl::StatusOr<DeviceInfo>> started);
   // Waits for a job; false when stopping and none is left.
   bool NextJob(Job& job);
 
@@ -52,10 +51,10 @@ class RenderThread : public FrameEngine {
   std::thread thread_;
 };
 
-absl::Status RenderThread::Start(const std::string& device) {
+absl::Status RenderThread::Start(const RenderThreadOptions& options) {
   std::promise<absl::StatusOr<DeviceInfo>> promise;
   std::future<absl::StatusOr<DeviceInfo>> started = promise.get_future();
-  thread_ = std::thread(&RenderThread::Run, this, device, std::move(promise));
+  thread_ = std::thread(&RenderThread::Run, this, options, std::move(promise));
   const absl::StatusOr<DeviceInfo> info = started.get();
   if (!info.ok()) return info.status();
   device_ = *info;
@@ -95,9 +94,10 @@ bool RenderThread::NextJob(Job& job) {
   return true;
 }
 
-void RenderThread::Run(const std::string& device,
+void RenderThread::Run(const RenderThreadOptions& options,
                        std::promise<absl::StatusOr<DeviceInfo>> started) {
-  absl::StatusOr<std::unique_ptr<FrameRenderer>> renderer = FrameRenderer::Create(device);
+  absl::StatusOr<std::unique_ptr<FrameRenderer>> renderer =
+      FrameRenderer::Create(options.device, options.renderer);
   if (!renderer.ok()) {
     started.set_value(renderer.status());
     return;
@@ -122,7 +122,7 @@ void RenderThread::Run(const std::string& device,
 
 absl::StatusOr<std::unique_ptr<FrameEngine>> StartRenderThread(const RenderThreadOptions& options) {
   auto engine = std::make_unique<RenderThread>(options.max_queued_frames);
-  if (absl::Status started = engine->Start(options.device); !started.ok()) return started;
+  if (absl::Status started = engine->Start(options); !started.ok()) return started;
   return engine;
 }
 

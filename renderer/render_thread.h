@@ -6,6 +6,7 @@
 
 #include "absl/status/statusor.h"
 #include "renderer/frame_engine.h"
+#include "renderer/frame_renderer.h"
 
 namespace halflight {
 
@@ -14,6 +15,7 @@ struct RenderThreadOptions {
   // "uuid:<32 hex digits>", "cuda:<index>", "drm:<path of its node>".
   std::string device = "auto";
   int max_queued_frames = 64;  // waiting or rendering
+  FrameRendererOptions renderer;
 };
 
 // Creates the context before it returns. InvalidArgument for a device that cannot be parsed,

@@ -1,6 +1,7 @@
 #include "renderer/shadow_technique.h"
 
 #include "absl/strings/str_cat.h"
+#include "renderer/projection.h"
 #include "renderer/techniques/half_angle.h"
 #include "renderer/techniques/light_sweep.h"
 #include "renderer/techniques/reference.h"
@@ -22,10 +23,49 @@ const ShadowTechnique& TechniqueFor(ShadowTechniqueKind kind) {
   return half_angle;
 }
 
+ShadowTechniqueKind DefaultTechnique(const FrameRequest& request, bool software_renderer) {
+  const auto sweep = ShadowTechniqueKind::kLightSweep;
+  return software_renderer && TechniqueFor(sweep).Check(request).ok()
+             ? sweep
+             : ShadowTechniqueKind::kHalfAngle;
+}
+
 absl::Status CheckLightCount(const Scene& scene) {
   if (scene.lights.size() <= kMaxLights) return absl::OkStatus();
   return absl::InvalidArgumentError(absl::StrCat("lighting.lights: ", scene.lights.size(),
                                                  " lights, allowed: at most ", kMaxLights));
+}
+
+absl::Status Refuse(const std::string& field, const std::string& value, const char* technique,
+                    const std::string& allowed) {
+  return absl::InvalidArgumentError(
+      absl::StrCat(field, ": ", value, ", allowed under technique ", technique, ": ", allowed));
+}
+
+absl::Status CheckLightsOutside(const Scene& scene, const ParticleView& particles,
+                                const char* technique) {
+  for (size_t l = 0; l < scene.lights.size(); ++l) {
+    if (!scene.lights[l].casts_shadows() || !LiesAmong(scene.lights[l], particles)) continue;
+    const glm::dvec3& at = std::get<PointLight>(scene.lights[l].kind).position;
+    return Refuse(absl::StrCat("lighting.lights[", l, "].point.position"),
+                  absl::StrCat("(", at.x, ", ", at.y, ", ", at.z, ")"), technique,
+                  "outside the particles, for a light that casts shadows");
+  }
+  return absl::OkStatus();
+}
+
+absl::Status CheckNoScattering(const Scene& scene, const char* technique, const char* reason) {
+  if (!scene.scatters()) return absl::OkStatus();
+  const std::string allowed = absl::StrCat("0, since ", reason);
+  if (scene.shadow.blur_mode == BlurMode::kTexelsPerSlice) {
+    return Refuse("shadow.blur_texels", absl::StrCat(scene.shadow.blur_texels), technique, allowed);
+  }
+  if (scene.material.scattering_spread > 0.0F) {
+    return Refuse("material.scattering_spread", absl::StrCat(scene.material.scattering_spread),
+                  technique, allowed);
+  }
+  return Refuse("material.physical_scattering.albedo",
+                absl::StrCat(scene.material.physical_scattering->albedo), technique, allowed);
 }
 
 }  // namespace halflight

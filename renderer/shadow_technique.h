@@ -3,6 +3,7 @@
 #pragma once
 
 #include <stop_token>
+#include <string>
 #include <vector>
 
 #include "absl/status/status.h"
@@ -12,6 +13,7 @@
 
 namespace halflight {
 
+class FrameCache;
 struct DeviceInfo;
 struct Gpu;
 class StageClock;
@@ -20,6 +22,7 @@ class StageClock;
 struct DrawContext {
   Gpu& gpu;
   const DeviceInfo& device;
+  FrameCache& cache;
   const FrameRequest& request;
   const ParticleView& particles;
   const FramePlan& plan;
@@ -30,14 +33,20 @@ struct DrawContext {
 struct DrawnFrame {
   std::vector<Image> images;         // in the order of the request
   std::vector<LightReport> reports;  // one for each light of the scene
+  std::vector<PlannedPass> reused;   // of the plan: not run, since the cache had what they give
 };
 
 class ShadowTechnique {
  public:
   virtual ~ShadowTechnique() = default;
 
-  // Adds to a plan whose sizes are set: what will be drawn, and the passes that it comes to. No GL.
-  // InvalidArgument, naming the field, for what the technique cannot do.
+  // InvalidArgument, naming the field, for what the technique cannot do, whatever the particles. No
+  // GL.
+  [[nodiscard]] virtual absl::Status Check(const FrameRequest& request) const = 0;
+
+  // Adds to the plan of a request that was checked, whose sizes are set: what will be drawn, and
+  // the passes that it comes to. No GL. InvalidArgument, naming the field, for what it cannot do
+  // with these particles.
   virtual absl::Status Plan(const FrameRequest& request, const ParticleView& particles,
                             FramePlan& plan) const = 0;
 
@@ -47,7 +56,25 @@ class ShadowTechnique {
 
 const ShadowTechnique& TechniqueFor(ShadowTechniqueKind kind);
 
+// What draws a request that leaves its technique open, on a device that is a CPU rasteriser or is
+// not: on a CPU the light sweep wherever it can, which is faster there and nearer the image model;
+// otherwise half-angle slicing. On GPUs that stays so until the sweep has been measured on one.
+// `request.scene.shadow.technique` does not matter.
+ShadowTechniqueKind DefaultTechnique(const FrameRequest& request, bool software_renderer);
+
+// What techniques refuse in the same words, as InvalidArgument. `technique` is the refusing one's
+// name in the service, such as "LIGHT_SWEEP".
+
+// "<field>: <value>, allowed under technique <technique>: <allowed>"
+absl::Status Refuse(const std::string& field, const std::string& value, const char* technique,
+                    const std::string& allowed);
 // For techniques that go over the lights: at most kMaxLights.
 absl::Status CheckLightCount(const Scene& scene);
+// For techniques whose light buffers see the particles through one frustum: no shadow-casting light
+// among them.
+absl::Status CheckLightsOutside(const Scene& scene, const ParticleView& particles,
+                                const char* technique);
+// For techniques that cannot scatter; `reason` says why.
+absl::Status CheckNoScattering(const Scene& scene, const char* technique, const char* reason);
 
 }  // namespace halflight

@@ -31,11 +31,11 @@ struct ServerLimits {
 
 inline constexpr uint32_t kMinLightBufferSize = 16;
 
-// The limits that still hold when the device cannot have textures as large as allowed.
+// The limits that still hold when the device cannot have textures as large as allowed. Images may
+// be larger: they are drawn in bands.
 inline ServerLimits LimitsOnDevice(ServerLimits limits, const DeviceInfo& device) {
   if (device.max_texture_size > 0) {
     const auto largest = static_cast<uint32_t>(device.max_texture_size);
-    limits.max_image_size = std::min(limits.max_image_size, largest);
     limits.max_light_buffer_size = std::min(limits.max_light_buffer_size, largest);
   }
   return limits;

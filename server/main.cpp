@@ -55,7 +55,8 @@ int Fail(int code, const absl::Status& status) {
 int Run(const Options& options, const sigset_t& signals) {
   auto engine =
       StartRenderThread({.device = options.device,
-                         .max_queued_frames = static_cast<int>(options.limits.max_queued_frames)});
+                         .max_queued_frames = static_cast<int>(options.limits.max_queued_frames),
+                         .renderer = {.max_reuse_bytes = options.max_reuse_bytes}});
   if (!engine.ok()) {
     return Fail(kExitCannotStart, engine.status());
   }

@@ -64,6 +64,9 @@ void AddFlags(CLI::App& app, Options& options) {
   bytes("--max-particle-bytes", limits.max_particle_bytes, "Bytes of one particle set");
   bytes("--max-cache-bytes", limits.max_cache_bytes,
         "Bytes of all particle sets kept, and of all uploads in progress");
+  bytes("--max-reuse-bytes", options.max_reuse_bytes,
+        "Bytes of what frames leave to later ones of the same particles, in main memory and on the "
+        "device together; 0 reuses nothing");
   number("--max-image-size", limits.max_image_size,
          "Width and height of an image, times supersampling");
   number("--max-light-buffer-size", limits.max_light_buffer_size, "Texels along a light buffer");

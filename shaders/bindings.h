@@ -6,12 +6,14 @@
 #ifdef __cplusplus
 #include <cstdint>
 
+#include <glm/ext/vector_int4.hpp>
 #include <glm/mat4x4.hpp>
 #include <glm/vec2.hpp>
 #include <glm/vec4.hpp>
 
 namespace halflight::shader {
 using glm::dvec4;
+using glm::ivec4;
 using glm::mat4;
 using glm::uvec4;
 using glm::vec4;
@@ -170,6 +172,7 @@ struct ProjectionBlock {
   vec4 plane_from_pixel;  // the inverse
   vec4 target_size;       // xy: pixels; z: radii below this are drawn as this (plane units);
                           // w: scale of optical depths
+  vec4 band;              // pixels of the target that are drawn: xy: the first, zw: how many
 };
 
 // Values that serve where the particle set has no attribute of its own.
@@ -226,7 +229,10 @@ struct BlurBlock {
 };
 
 struct ResolveBlock {
-  uvec4 factor;  // x: samples (or pixels, when enlarging) along each side
+  ivec4 factor;  // x: samples (or pixels, when enlarging) along each side
+  ivec4
+      first;   // of the band that is drawn: xy: its first pixel, zw: the first sample of the source
+  ivec4 size;  // xy: samples of all bands
 };
 
 // The part of a prefix sum that one dispatch sees.

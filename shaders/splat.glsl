@@ -23,8 +23,10 @@ struct Encounter {
   bool in_front;      // of the eye
 };
 
+// `pixel` is that of the band.
 vec2 PlaneFromPixel(vec2 pixel) {
-  return pixel * projection.plane_from_pixel.xy + projection.plane_from_pixel.zw;
+  return (pixel + projection.band.xy) * projection.plane_from_pixel.xy +
+         projection.plane_from_pixel.zw;
 }
 
 // With D = (plane, -1) the ray and o = w (c, -1) the centre, o x D = w ((c, -1) x (plane - c, 0)):
@@ -59,8 +61,8 @@ float ProfileWeight(float rho_squared) {
   return kBallProfile ? sqrt(w) : w;
 }
 
-// Corner 0 to 3 of a splat's rectangle in clip space. Target row 0 is at y = -1.
+// Corner 0 to 3 of a splat's rectangle in the band's clip space, whose row 0 is at y = -1.
 vec4 RectCorner(vec4 rect, int corner) {
   vec2 pixel = vec2((corner & 1) == 0 ? rect.x : rect.z, (corner & 2) == 0 ? rect.y : rect.w);
-  return vec4(pixel / projection.target_size.xy * 2.0 - 1.0, 0.0, 1.0);
+  return vec4((pixel - projection.band.xy) / projection.band.zw * 2.0 - 1.0, 0.0, 1.0);
 }

@@ -161,11 +161,13 @@ void AddShadowFlags(CLI::App& app, RenderOptions& options) {
                                   {"light-sweep", v1::SHADOW_TECHNIQUE_LIGHT_SWEEP},
                                   {"reference", v1::SHADOW_TECHNIQUE_REFERENCE}},
                                  "How shadows are computed: by slices; along each light, on the "
-                                 "CPU; or exactly, in float64 on "
-                                 "the CPU");
+                                 "CPU; or exactly, in float64 on the CPU. Default: light-sweep on "
+                                 "servers without a GPU, unless something asks for slices "
+                                 "(--slices, --plain, --spacing, --blur, --scattering, layers); "
+                                 "otherwise half-angle");
   AddCount(app, "--fit-degree", options.fit_degree, 0, 6,
            "Degree in which light-sweep keeps the light over a particle; default: 4");
-  AddCount(app, "--slices", options.slices, 1, INT32_MAX, "Slices; default: 128");
+  AddCount(app, "--slices", options.slices, 1, INT32_MAX, "Slices of half-angle; default: 128");
   app.add_flag("--plain", options.plain, "Do not interpolate the light within a slice");
   AddChoice<v1::SliceSpacing>(app, "--spacing", options.spacing,
                               {{"count", v1::SLICE_SPACING_EQUAL_COUNT},

@@ -81,10 +81,14 @@ shader::CompositeBlock DescribeComposite(const Scene& scene, const Traversal& tr
 
 }  // namespace
 
-CompositeTarget MakeCompositeTarget(const glm::ivec2& size, bool depth, bool transmittance) {
+CompositeTarget MakeCompositeTarget(const Projection& eye, const ParticleView& particles,
+                                    const PixelRect& samples, bool depth, bool transmittance) {
   CompositeTarget target;
+  shader::ProjectionBlock block = eye.block(particles);
+  block.band = glm::vec4(samples.x, samples.y, samples.width, samples.height);
+  target.projection = gl::MakeBlock("projection of a band", block);
   const gl::TextureInfo info{
-      .label = "image", .format = GL_RGBA32F, .width = size.x, .height = size.y};
+      .label = "image", .format = GL_RGBA32F, .width = samples.width, .height = samples.height};
   target.image = gl::Texture(info);
   if (depth) target.depth = gl::Texture(info);
   if (transmittance) target.transmittance = gl::Texture(info);
@@ -98,8 +102,8 @@ CompositeTarget MakeCompositeTarget(const glm::ivec2& size, bool depth, bool tra
 }
 
 CompositePass PrepareComposite(const Scene& scene, const Traversal& traversal,
-                               const OrderBuffers& order, const ParticleBuffers& particles,
-                               const TargetProjection& eye, const gl::Buffer& eye_splats,
+                               const DeviceOrder& order, const ParticleBuffers& particles,
+                               const Projection& eye, const gl::Buffer& eye_splats,
                                const TargetProjection* light, const gl::Buffer* light_splats,
                                const CompositeTarget& target) {
   const bool point_light = light != nullptr && !light->projection.orthographic;
@@ -110,15 +114,14 @@ CompositePass PrepareComposite(const Scene& scene, const Traversal& traversal,
   return {
       .order = order,
       .particles = particles,
-      .eye = eye,
       .eye_splats = eye_splats,
       .light_splats = light_splats,
       .uniforms = gl::MakeBlock("composite",
-                                DescribeComposite(scene, traversal, lights, eye.projection,
+                                DescribeComposite(scene, traversal, lights, eye,
                                                   light != nullptr ? &light->projection : nullptr)),
       .constants =
           {
-              {shader::kOrthographicConstant, eye.projection.orthographic},
+              {shader::kOrthographicConstant, eye.orthographic},
               {shader::kBallProfileConstant, scene.material.profile == Profile::kBall},
               {shader::kHasColorsConstant, particles.has_colors},
               // Emission belongs to one traversal only.
@@ -131,7 +134,7 @@ CompositePass PrepareComposite(const Scene& scene, const Traversal& traversal,
               {shader::kColoredDensityConstant, colored_density},
               {shader::kVaryingLightsConstant, static_cast<uint32_t>(lights.varying.size())},
               {shader::kShadowLightVariesConstant, lights.shadow_light_varies},
-              {shader::kNearEyeConstant, eye.projection.near_eye},
+              {shader::kNearEyeConstant, eye.near_eye},
               {shader::kPhaseConstant, scene.material.phase_g != 0.0F},
               {shader::kDepthOutputConstant, static_cast<bool>(target.depth)},
               {shader::kTransmittanceOutputConstant, static_cast<bool>(target.transmittance)},
@@ -141,12 +144,10 @@ CompositePass PrepareComposite(const Scene& scene, const Traversal& traversal,
 }
 
 absl::Status CompositeSlice(Gpu& gpu, const CompositePass& pass, uint32_t begin, uint32_t end,
-                            const SliceLight* light, const CompositeTarget& target) {
+                            const SliceLight* light, std::span<const CompositeTarget> targets) {
   const gl::DebugScope scope("composite slice");
   const absl::StatusOr<GLuint> program = gpu.programs.Get(CompositeProgram(), pass.constants);
   if (!program.ok()) return program.status();
-  glBindFramebuffer(GL_FRAMEBUFFER, target.framebuffer.name());
-  glViewport(0, 0, target.image.width(), target.image.height());
   glEnable(GL_BLEND);
   glBlendEquation(GL_FUNC_ADD);
   if (pass.back_to_front) {
@@ -155,9 +156,8 @@ absl::Status CompositeSlice(Gpu& gpu, const CompositePass& pass, uint32_t begin,
     glBlendFunc(GL_ONE_MINUS_DST_ALPHA, GL_ONE);
   }
   glUseProgram(*program);
-  glBindBufferBase(GL_UNIFORM_BUFFER, shader::kProjectionBinding, pass.eye.block.name());
   glBindBufferBase(GL_UNIFORM_BUFFER, shader::kCompositeBinding, pass.uniforms.name());
-  glBindBufferBase(GL_SHADER_STORAGE_BUFFER, shader::kOrderBinding, pass.order.order.name());
+  glBindBufferBase(GL_SHADER_STORAGE_BUFFER, shader::kOrderBinding, pass.order.places.name());
   glBindBufferBase(GL_SHADER_STORAGE_BUFFER, shader::kColorsBinding, pass.particles.colors.name());
   glBindBufferBase(GL_SHADER_STORAGE_BUFFER, shader::kEmissionsBinding,
                    pass.particles.emissions.name());
@@ -168,7 +168,12 @@ absl::Status CompositeSlice(Gpu& gpu, const CompositePass& pass, uint32_t begin,
     glBindTextureUnit(shader::kLightBeforeBinding, light->before.texture.name());
     glBindTextureUnit(shader::kLightAfterBinding, light->after.texture.name());
   }
-  DrawQuads(gpu, pass.order, begin, end);
+  for (const CompositeTarget& target : targets) {
+    glBindFramebuffer(GL_FRAMEBUFFER, target.framebuffer.name());
+    glViewport(0, 0, target.image.width(), target.image.height());
+    glBindBufferBase(GL_UNIFORM_BUFFER, shader::kProjectionBinding, target.projection.name());
+    DrawQuads(gpu, begin, end);
+  }
   return absl::OkStatus();
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <optional>
+#include <span>
 
 #include "absl/status/status.h"
 #include "renderer/frame_plan.h"
@@ -11,16 +12,19 @@
 
 namespace halflight {
 
-// What a traversal draws into; depth and transmittance only where an output shows them.
+// What a traversal draws a band of the image into; depth and transmittance only where an output
+// shows them.
 struct CompositeTarget {
+  gl::Buffer projection;      // shader::ProjectionBlock, of the band
   gl::Texture image;          // premultiplied R G B A
   gl::Texture depth;          // depth * alpha, alpha in A
   gl::Texture transmittance;  // R G B * alpha, alpha
   gl::Framebuffer framebuffer;
 };
 
-// Cleared to nothing covered.
-CompositeTarget MakeCompositeTarget(const glm::ivec2& size, bool depth, bool transmittance);
+// Holds the samples of a band of what `eye` projects onto, cleared to nothing covered.
+CompositeTarget MakeCompositeTarget(const Projection& eye, const ParticleView& particles,
+                                    const PixelRect& samples, bool depth, bool transmittance);
 
 // The light buffers that a slice sees.
 struct SliceLight {
@@ -30,9 +34,8 @@ struct SliceLight {
 
 // Everything about a traversal that stays the same from slice to slice.
 struct CompositePass {
-  const OrderBuffers& order;
+  const DeviceOrder& order;
   const ParticleBuffers& particles;
-  const TargetProjection& eye;
   const gl::Buffer& eye_splats;
   const gl::Buffer* light_splats;  // null: no shadows
   gl::Buffer uniforms;             // shader::CompositeBlock
@@ -40,15 +43,16 @@ struct CompositePass {
   bool back_to_front;
 };
 
-// `light` and `light_splats` are those of traversal.shadow_light, null without.
+// `light` and `light_splats` are those of traversal.shadow_light, null without. `target` is one of
+// those that will be drawn into, which are all alike.
 CompositePass PrepareComposite(const Scene& scene, const Traversal& traversal,
-                               const OrderBuffers& order, const ParticleBuffers& particles,
-                               const TargetProjection& eye, const gl::Buffer& eye_splats,
+                               const DeviceOrder& order, const ParticleBuffers& particles,
+                               const Projection& eye, const gl::Buffer& eye_splats,
                                const TargetProjection* light, const gl::Buffer* light_splats,
                                const CompositeTarget& target);
 
-// Draws particles [begin, end) of the order over `target`; `light` is null without shadows.
+// Draws particles [begin, end) of the order over all targets; `light` is null without shadows.
 absl::Status CompositeSlice(Gpu& gpu, const CompositePass& pass, uint32_t begin, uint32_t end,
-                            const SliceLight* light, const CompositeTarget& target);
+                            const SliceLight* light, std::span<const CompositeTarget> targets);
 
 }  // namespace halflight

@@ -97,10 +97,9 @@ LightBuffer MakeLightBuffer(const char* label, int size, const LightChannels& ch
   return buffer;
 }
 
-absl::Status DepositSlice(Gpu& gpu, const OrderBuffers& order, const gl::Buffer& light_splats,
-                          const TargetProjection& light, Profile profile,
-                          const LightChannels& channels, uint32_t begin, uint32_t end,
-                          const LightBuffer& target) {
+absl::Status DepositSlice(Gpu& gpu, const gl::Buffer& light_splats, const TargetProjection& light,
+                          Profile profile, const LightChannels& channels, uint32_t begin,
+                          uint32_t end, const LightBuffer& target) {
   const gl::DebugScope scope("deposit slice into light buffer");
   const absl::StatusOr<GLuint> program = gpu.programs.Get(
       DepositProgram(), {
@@ -118,7 +117,7 @@ absl::Status DepositSlice(Gpu& gpu, const OrderBuffers& order, const gl::Buffer&
   glUseProgram(*program);
   glBindBufferBase(GL_UNIFORM_BUFFER, shader::kProjectionBinding, light.block.name());
   glBindBufferBase(GL_SHADER_STORAGE_BUFFER, shader::kLightSplatsBinding, light_splats.name());
-  DrawQuads(gpu, order, begin, end);
+  DrawQuads(gpu, begin, end);
   return absl::OkStatus();
 }
 

@@ -27,10 +27,9 @@ struct LightChannels {
 LightBuffer MakeLightBuffer(const char* label, int size, const LightChannels& channels);
 
 // Adds particles [begin, end) of the order to `target`. `light` is the projection of the splats.
-absl::Status DepositSlice(Gpu& gpu, const OrderBuffers& order, const gl::Buffer& light_splats,
-                          const TargetProjection& light, Profile profile,
-                          const LightChannels& channels, uint32_t begin, uint32_t end,
-                          const LightBuffer& target);
+absl::Status DepositSlice(Gpu& gpu, const gl::Buffer& light_splats, const TargetProjection& light,
+                          Profile profile, const LightChannels& channels, uint32_t begin,
+                          uint32_t end, const LightBuffer& target);
 
 void CopyLightBuffer(const LightBuffer& from, const LightBuffer& to);
 

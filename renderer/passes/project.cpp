@@ -20,7 +20,7 @@ TargetProjection UploadProjection(const Projection& projection, const ParticleVi
 }
 
 absl::StatusOr<gl::Buffer> ProjectParticles(Gpu& gpu, const ParticleBuffers& particles,
-                                            const OrderBuffers& order,
+                                            const DeviceOrder& order,
                                             const TargetProjection& target, const char* label) {
   const gl::DebugScope scope(label);
   const absl::StatusOr<GLuint> program = gpu.programs.Get(
@@ -36,7 +36,7 @@ absl::StatusOr<gl::Buffer> ProjectParticles(Gpu& gpu, const ParticleBuffers& par
   glUseProgram(*program);
   glBindBufferBase(GL_UNIFORM_BUFFER, shader::kProjectionBinding, target.block.name());
   glBindBufferBase(GL_UNIFORM_BUFFER, shader::kParticlesBinding, particles.uniforms.name());
-  glBindBufferBase(GL_SHADER_STORAGE_BUFFER, shader::kOrderBinding, order.order.name());
+  glBindBufferBase(GL_SHADER_STORAGE_BUFFER, shader::kOrderBinding, order.places.name());
   glBindBufferBase(GL_SHADER_STORAGE_BUFFER, shader::kPositionsBinding, particles.positions.name());
   glBindBufferBase(GL_SHADER_STORAGE_BUFFER, shader::kRadiiBinding, particles.radii.name());
   glBindBufferBase(GL_SHADER_STORAGE_BUFFER, shader::kOpticalDepthsBinding,

@@ -17,7 +17,7 @@ TargetProjection UploadProjection(const Projection& projection, const ParticleVi
 
 // Returns shader::Splat[], one for each place of the order.
 absl::StatusOr<gl::Buffer> ProjectParticles(Gpu& gpu, const ParticleBuffers& particles,
-                                            const OrderBuffers& order,
+                                            const DeviceOrder& order,
                                             const TargetProjection& target, const char* label);
 
 }  // namespace halflight

@@ -19,21 +19,26 @@ const gl::ProgramSource& ResolveProgram() {
 }  // namespace
 
 absl::StatusOr<gl::Texture> ResolveSamples(Gpu& gpu, const gl::Texture& samples,
-                                           const Sampling& sampling, const glm::ivec2& size) {
+                                           const Sampling& sampling, const Band& band,
+                                           const glm::ivec2& composite_size) {
   const gl::DebugScope scope("resolve samples");
   const bool enlarge = sampling.downsample > 1;
   const absl::StatusOr<GLuint> program =
       gpu.programs.Get(ResolveProgram(), {{shader::kEnlargeConstant, enlarge}});
   if (!program.ok()) return program.status();
-  gl::Texture pixels(
-      {.label = "resolved", .format = GL_RGBA32F, .width = size.x, .height = size.y});
+  gl::Texture pixels({.label = "resolved",
+                      .format = GL_RGBA32F,
+                      .width = band.pixels.width,
+                      .height = band.pixels.height});
   const gl::Framebuffer framebuffer = gl::MakeFramebuffer("resolve", {&pixels});
   shader::ResolveBlock block{};
-  block.factor.x = static_cast<uint32_t>(enlarge ? sampling.downsample : sampling.supersample);
+  block.factor.x = enlarge ? sampling.downsample : sampling.supersample;
+  block.first = {band.pixels.x, band.pixels.y, band.samples.x, band.samples.y};
+  block.size = {composite_size, 0, 0};
   const gl::Buffer uniforms = gl::MakeBlock("resolve", block);
 
   glBindFramebuffer(GL_FRAMEBUFFER, framebuffer.name());
-  glViewport(0, 0, size.x, size.y);
+  glViewport(0, 0, pixels.width(), pixels.height());
   glDisable(GL_BLEND);
   glUseProgram(*program);
   glBindBufferBase(GL_UNIFORM_BUFFER, shader::kResolveBinding, uniforms.name());

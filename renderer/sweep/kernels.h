@@ -110,9 +110,10 @@ struct ImageTileJob {
   uint32_t entry_count = 0;
   int first_row = 0;                 // of the tile in the image
   float least_transmittance = 0.0F;  // stop where all pixels are below
-  float* pixels = nullptr;           // out: red, green, blue, coverage
-  float* depth = nullptr;            // out: sum of depth times what is seen of a particle, or null
-  // Out: for each of the lights the same of exp(-exponent), three planes a light, or null.
+  // In: what lies in front of the sprites; out: with them.
+  float* pixels = nullptr;  // red, green, blue, coverage
+  float* depth = nullptr;   // sum of depth times what is seen of a particle, or null
+  // For each of the lights the same of exp(-exponent), three planes a light, or null.
   float* transmittance = nullptr;
 };
 

@@ -31,7 +31,8 @@ class DiscFit {
   void Fit(std::span<const float> weights, std::span<const float> values,
            std::span<float> polynomial) const;
 
-  // Inverse of the products of the monomials, scaled so that that of 1 and 1 is 1; Terms(degree) squared.
+  // Inverse of the products of the monomials, scaled so that that of 1 and 1 is 1; Terms(degree)
+  // squared.
   [[nodiscard]] std::vector<double> inverse_gram() const;
 
  private:

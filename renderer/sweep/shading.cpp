@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
@@ -106,20 +107,39 @@ struct LightAxes {
   glm::dvec3 y{0.0};
 };
 
-LightAxes AxesOf(const LightFit& fit, uint32_t particle, double optical_depth,
-                 const glm::dmat3& view_from_eye_view) {
-  const Sprite& sprite = fit.sprites[particle];
-  // Enlarged particles keep tau r^2, which tells by how much they were.
-  const double radii = optical_depth > 0.0 ? std::sqrt(sprite.optical_depth / optical_depth) : 1.0;
-  // Rows of the rotation: the light's axes in the eye's.
-  const glm::dmat3 axes = glm::transpose(view_from_eye_view);
-  LightAxes light{axes[0] * radii, axes[1] * radii};
-  if (!fit.projection.orthographic) {
-    light.x += axes[2] * (radii * sprite.x);
-    light.y += axes[2] * (radii * sprite.y);
+// Turns a light's fits to the eye's axes.
+class LightAxesOf {
+ public:
+  LightAxesOf(const Projection& light, const Projection& eye, const ParticleView& particles)
+      : light_(light),
+        particles_(particles),
+        rotation_(light.view_from_world),
+        origin_from_light_(particles.set().origin - light.eye()),
+        // Rows of the rotation from the eye's view: the light's axes in the eye's.
+        axes_(glm::dmat3(eye.view_from_world) * glm::transpose(rotation_)) {}
+
+  [[nodiscard]] LightAxes operator()(uint32_t particle) const {
+    const double radius = particles_.radius(particle);
+    // Particles smaller than the light buffer can show lie there enlarged; see ListSprites.
+    if (light_.orthographic) {
+      const double radii = radius / std::max(radius, light_.least_radius);
+      return {axes_[0] * radii, axes_[1] * radii};
+    }
+    const glm::dvec3 view =
+        rotation_ * (glm::dvec3(particles_.positions()[particle]) + origin_from_light_);
+    const double w = std::max(-view.z, 1e-300);
+    const double radii = radius / std::max(radius, light_.least_radius * w);
+    return {(axes_[0] + axes_[2] * (view.x / w)) * radii,
+            (axes_[1] + axes_[2] * (view.y / w)) * radii};
   }
-  return light;
-}
+
+ private:
+  const Projection& light_;
+  const ParticleView& particles_;
+  glm::dmat3 rotation_;
+  glm::dvec3 origin_from_light_;
+  glm::dmat3 axes_;
+};
 
 Rgb ToRgb(const glm::vec3& color) { return {color.x, color.y, color.z}; }
 
@@ -160,17 +180,17 @@ glm::vec3 ConstantLight(const Scene& scene) {
 
 ShadedSprites Shading::View(const SpriteList& list) const {
   ShadedSprites view;
-  view.sprites = list.sprites.data();
+  view.sprites = list.sprites.data() + run.begin;
   view.rows = rows.data();
   view.unshadowed = unshadowed.data();
   view.depth = depth.empty() ? nullptr : depth.data();
-  view.lights = static_cast<int>(lights.size());
+  view.lights = lights;
   view.exponents = exponents;
   view.shadow_alone = shadow_alone.data();
   view.degree = degree;
   view.lit = lit.data();
   view.exponent = exponent.data();
-  view.near = list.near.empty() ? nullptr : list.near.data();
+  view.near = list.near.empty() ? nullptr : list.near.data() + run.begin;
   view.near_lights = near_lights.data();
   return view;
 }
@@ -185,31 +205,32 @@ double NearDepth(const Scene& scene) {
 }
 
 Shading ShadeSprites(const Scene& scene, const ParticleView& particles, const Projection& eye,
-                     const SpriteList& list, const std::vector<const LightFit*>& fits, int degree,
-                     bool keep_depth, bool keep_transmittance) {
+                     const SpriteList& list, const TileRun& run,
+                     const std::vector<TileLight>& tile_lights,
+                     const std::vector<const LightFit*>& fits, int degree, bool keep_depth) {
   const Material& material = scene.material;
   const ParticleSet& set = particles.set();
-  const size_t count = list.sprites.size();
+  const size_t count = run.size();
   Shading shading;
-  shading.lights = ListTileLights(scene, keep_transmittance);
+  shading.run = run;
+  shading.lights = static_cast<int>(tile_lights.size());
   shading.degree = degree;
   const glm::vec3 constant = ConstantLight(scene);
   std::vector<const LightFit*> fit_of;  // by slot
   std::vector<RadianceFactor> factors;
-  std::vector<glm::dmat3> rotations;
-  for (const TileLight& light : shading.lights) {
+  std::vector<std::optional<LightAxesOf>> axes_of;
+  for (const TileLight& light : tile_lights) {
     const Light& source = scene.lights[static_cast<size_t>(light.light)];
     const LightFit* const fit = fits[static_cast<size_t>(light.light)];
     fit_of.push_back(fit);
     shading.exponents = source.colored_density() && fit != nullptr ? 3 : shading.exponents;
     shading.shadow_alone[factors.size()] = !light.varies;
     factors.emplace_back(source, material, eye.view_from_world);
-    rotations.push_back(fit == nullptr ? glm::dmat3(1.0)
-                                       : glm::dmat3(fit->projection.view_from_world) *
-                                             glm::transpose(glm::dmat3(eye.view_from_world)));
+    axes_of.emplace_back();
+    if (fit != nullptr) axes_of.back().emplace(fit->projection, eye, particles);
   }
 
-  const size_t lights = shading.lights.size();
+  const size_t lights = tile_lights.size();
   const auto terms = static_cast<size_t>(Terms(degree));
   const auto exponents = static_cast<size_t>(shading.exponents);
   shading.rows.resize(2 * count);
@@ -220,12 +241,13 @@ Shading ShadeSprites(const Scene& scene, const ParticleView& particles, const Pr
   if (!list.near.empty()) shading.near_lights.resize(count * lights);
   ParallelRanges(count, [&](const WorkRange& range) {
     for (size_t place = range.begin; place < range.end; ++place) {
-      if (list.rects[place].empty()) continue;
-      const uint32_t i = list.particles[place];
-      const Sprite& sprite = list.sprites[place];
+      const Rect& rect = list.rects[run.begin + place];
+      if (rect.empty()) continue;
+      const uint32_t i = list.particles[run.begin + place];
+      const Sprite& sprite = list.sprites[run.begin + place];
       const bool near = !eye.orthographic && sprite.scale == 0.0F;
-      shading.rows[2 * place] = list.rects[place].y_begin;
-      shading.rows[2 * place + 1] = list.rects[place].y_end;
+      shading.rows[2 * place] = rect.y_begin;
+      shading.rows[2 * place + 1] = rect.y_end;
       const glm::vec3 albedo =
           set.colors.empty() ? material.albedo : material.albedo * set.colors[i];
       shading.unshadowed[place] =
@@ -235,7 +257,7 @@ Shading ShadeSprites(const Scene& scene, const ParticleView& particles, const Pr
       const Footprint footprint = FootprintOf(sprite, eye.orthographic);
       glm::dvec3 center(sprite.x, sprite.y, -1.0);  // view axes, from the eye
       if (near) {
-        const float* const c = list.near[place].center;
+        const float* const c = list.near[run.begin + place].center;
         center = radius * glm::dvec3(c[0], c[1], c[2]);
       } else if (!eye.orthographic) {
         center *= sprite.scale * radius;
@@ -252,7 +274,7 @@ Shading ShadeSprites(const Scene& scene, const ParticleView& particles, const Pr
       }
 
       for (size_t l = 0; l < lights; ++l) {
-        const TileLight& light = shading.lights[l];
+        const TileLight& light = tile_lights[l];
         const Light& source = scene.lights[static_cast<size_t>(light.light)];
         double factor = 1.0;
         Coefficients varying = {};
@@ -272,9 +294,7 @@ Shading ShadeSprites(const Scene& scene, const ParticleView& particles, const Pr
             light.adds ? ToRgb(albedo * source.color * static_cast<float>(factor)) : Rgb{};
 
         float* const own = &shading.exponent[(place * lights + l) * exponents * terms];
-        const LightAxes axes =
-            fit_of[l] == nullptr ? LightAxes{}
-                                 : AxesOf(*fit_of[l], i, particles.optical_depth(i), rotations[l]);
+        const LightAxes axes = axes_of[l] ? (*axes_of[l])(i) : LightAxes{};
         for (size_t e = 0; e < exponents; ++e) {
           const std::span<float> out(own + e * terms, terms);
           if (fit_of[l] != nullptr) {

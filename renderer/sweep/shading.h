@@ -30,9 +30,11 @@ int TransmittanceSlot(const std::vector<TileLight>& lights, int light);
 // The same everywhere: ambient light, and that of lights that neither cast shadows nor vary.
 glm::vec3 ConstantLight(const Scene& scene);
 
-// Owns what ShadedSprites points to, but for the sprites.
+// Of the sprites of a run of a list, by their place in it. Owns what ShadedSprites points to, but
+// for the sprites.
 struct Shading {
-  std::vector<TileLight> lights;
+  TileRun run;
+  int lights = 0;
   int degree = 0;
   int exponents = 1;
   std::array<bool, kMaxTileLights> shadow_alone = {};
@@ -43,6 +45,7 @@ struct Shading {
   Block<float> exponent;
   std::vector<NearLight> near_lights;
 
+  // `list` is the one that the run is of.
   [[nodiscard]] ShadedSprites View(const SpriteList& list) const;
 };
 
@@ -52,10 +55,11 @@ struct Shading {
 // it at their centre.
 double NearDepth(const Scene& scene);
 
-// `fits` has one for each light of the scene, null for those that cast no shadows. `keep_depth` and
-// `keep_transmittance`: an output shows them.
+// `lights` are those listed of the scene; `fits` has one for each light of the scene, made to
+// `degree`, null for those that cast no shadows. `keep_depth`: an output shows it. Uses all cores.
 Shading ShadeSprites(const Scene& scene, const ParticleView& particles, const Projection& eye,
-                     const SpriteList& list, const std::vector<const LightFit*>& fits, int degree,
-                     bool keep_depth, bool keep_transmittance);
+                     const SpriteList& list, const TileRun& run,
+                     const std::vector<TileLight>& lights, const std::vector<const LightFit*>& fits,
+                     int degree, bool keep_depth);
 
 }  // namespace halflight::sweep

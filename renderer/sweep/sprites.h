@@ -13,11 +13,16 @@ namespace halflight::sweep {
 
 struct SpriteList {
   std::vector<uint32_t> particles;  // nearest the eye or the light first; equal depths by index
-  Block<Sprite> sprites;      // of those, as the next
-  Block<Rect> rects;          // pixels that may lie within
+  Block<Sprite> sprites;            // of those, as the next
+  Block<Rect> rects;                // pixels that may lie within
   // Centres in radii of those near a perspective target's eye, whose scale is 0; empty where there
   // are none.
   std::vector<NearSprite> near;
+
+  [[nodiscard]] size_t bytes() const {
+    return particles.capacity() * sizeof(uint32_t) + sprites.capacity() * sizeof(Sprite) +
+           rects.capacity() * sizeof(Rect) + near.capacity() * sizeof(NearSprite);
+  }
 };
 
 // Radii from the plane through the eye within which a particle may reach it, as rounding goes.

@@ -9,20 +9,6 @@ namespace halflight::sweep {
 
 namespace {
 
-struct TileRange {
-  int x_begin, x_end, y_begin, y_end;
-
-  [[nodiscard]] uint32_t count() const {
-    return static_cast<uint32_t>((x_end - x_begin) * (y_end - y_begin));
-  }
-};
-
-TileRange TilesOf(const Rect& rect, int tile_size) {
-  if (rect.empty()) return {0, 0, 0, 0};
-  return {rect.x_begin / tile_size, (rect.x_end - 1) / tile_size + 1, rect.y_begin / tile_size,
-          (rect.y_end - 1) / tile_size + 1};
-}
-
 template <typename Visit>
 void ForTilesOf(const Rect& rect, int tile_size, int tiles_across, const Visit& visit) {
   const TileRange range = TilesOf(rect, tile_size);
@@ -35,6 +21,12 @@ void ForTilesOf(const Rect& rect, int tile_size, int tiles_across, const Visit& 
 
 }  // namespace
 
+TileRange TilesOf(const Rect& rect, int tile_size) {
+  if (rect.empty()) return {};
+  return {rect.x_begin / tile_size, (rect.x_end - 1) / tile_size + 1, rect.y_begin / tile_size,
+          (rect.y_end - 1) / tile_size + 1};
+}
+
 std::vector<uint32_t> LongestFirst(const TileLists& lists) {
   std::vector<uint32_t> tiles(lists.begin.size() - 1);
   std::iota(tiles.begin(), tiles.end(), 0U);
@@ -44,7 +36,7 @@ std::vector<uint32_t> LongestFirst(const TileLists& lists) {
   return tiles;
 }
 
-TileLists ListTiles(const Block<Rect>& rects, const glm::ivec2& target_size, int tile_size) {
+TileLists ListTiles(std::span<const Rect> rects, const glm::ivec2& target_size, int tile_size) {
   TileLists lists;
   lists.tile_size = tile_size;
   lists.tiles = (target_size + (tile_size - 1)) / tile_size;
@@ -53,16 +45,12 @@ TileLists ListTiles(const Block<Rect>& rects, const glm::ivec2& target_size, int
 
   // Count: of each worker's range of items, the entries of every tile.
   std::vector<std::vector<uint32_t>> counts(workers);
-  std::vector<uint32_t> parts(workers, 0);
   ParallelRanges(rects.size(), [&](const WorkRange& range) {
     std::vector<uint32_t> count(tile_count, 0);
-    uint32_t entries = 0;
     for (size_t i = range.begin; i < range.end; ++i) {
       ForTilesOf(rects[i], tile_size, lists.tiles.x, [&](size_t tile) { ++count[tile]; });
-      entries += TilesOf(rects[i], tile_size).count();
     }
     counts[range.worker] = std::move(count);
-    parts[range.worker] = entries;
   });
 
   // Sum: where each worker's entries of each tile begin, earlier items first.
@@ -80,20 +68,30 @@ TileLists ListTiles(const Block<Rect>& rects, const glm::ivec2& target_size, int
 
   // Scatter.
   lists.entries.resize(total);
-  lists.part_begin.resize(rects.size() + 1);
   ParallelRanges(rects.size(), [&](const WorkRange& range) {
-    uint32_t part = 0;
-    for (size_t worker = 0; worker < range.worker; ++worker) part += parts[worker];
     std::vector<size_t>& next = at[range.worker];
     for (size_t i = range.begin; i < range.end; ++i) {
-      lists.part_begin[i] = part;
-      ForTilesOf(rects[i], tile_size, lists.tiles.x, [&](size_t tile) {
-        lists.entries[next[tile]++] = {static_cast<uint32_t>(i), part++};
-      });
+      ForTilesOf(rects[i], tile_size, lists.tiles.x,
+                 [&](size_t tile) { lists.entries[next[tile]++] = static_cast<uint32_t>(i); });
     }
   });
-  lists.part_begin[rects.size()] = static_cast<uint32_t>(total);
   return lists;
+}
+
+std::vector<TileRun> CutIntoRuns(std::span<const Rect> rects, int tile_size,
+                                 const RunLimits& limits) {
+  std::vector<TileRun> runs;
+  size_t entries = 0;
+  for (size_t i = 0; i < rects.size(); ++i) {
+    const size_t more = TilesOf(rects[i], tile_size).count();
+    if (runs.empty() || runs.back().size() == limits.rects || entries + more > limits.entries) {
+      runs.push_back({i, i});
+      entries = 0;
+    }
+    runs.back().end = i + 1;
+    entries += more;
+  }
+  return runs;
 }
 
 }  // namespace halflight::sweep

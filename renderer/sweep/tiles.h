@@ -1,8 +1,9 @@
-// Which particles touch which tile of a target, in order.
+// Which particles touch which tile of a target, in order; and how many of them are listed at once.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include <glm/vec2.hpp>
@@ -21,26 +22,58 @@ struct Rect {
   [[nodiscard]] bool empty() const { return x_begin >= x_end; }
 };
 
-// One entry for each tile that a rectangle touches.
-struct TileEntry {
-  uint32_t item;  // whose rectangle
-  uint32_t part;  // counts the entries in the order of items
+// Largest side of a target that rectangles reach across.
+inline constexpr int kMaxTargetSide = 65535;
+
+// Tiles [x_begin, x_end) by [y_begin, y_end).
+struct TileRange {
+  int x_begin = 0;
+  int x_end = 0;
+  int y_begin = 0;
+  int y_end = 0;
+
+  [[nodiscard]] size_t count() const {
+    return static_cast<size_t>(x_end - x_begin) * static_cast<size_t>(y_end - y_begin);
+  }
 };
+
+// Those that a rectangle touches.
+TileRange TilesOf(const Rect& rect, int tile_size);
 
 struct TileLists {
   glm::ivec2 tiles{0};
   int tile_size = 0;  // pixels along each side
-  // Tile t (row by row) has entries [begin[t], begin[t + 1]), by ascending item.
+  // Tile t (row by row) has entries [begin[t], begin[t + 1]): indices of the rectangles that touch
+  // it, ascending.
   std::vector<size_t> begin;
-  Block<TileEntry> entries;
-  // Item i has the parts [part_begin[i], part_begin[i + 1]).
-  Block<uint32_t> part_begin;
+  Block<uint32_t> entries;
+
+  [[nodiscard]] size_t bytes() const {
+    return begin.capacity() * sizeof(size_t) + entries.capacity() * sizeof(uint32_t);
+  }
 };
 
 // The tiles, those with the most entries first: where there are few, the cores end together.
 std::vector<uint32_t> LongestFirst(const TileLists& lists);
 
-// Uses all cores. Targets of at most 65535 pixels along a side.
-TileLists ListTiles(const Block<Rect>& rects, const glm::ivec2& target_size, int tile_size);
+// Uses all cores. Targets of at most kMaxTargetSide pixels along a side.
+TileLists ListTiles(std::span<const Rect> rects, const glm::ivec2& target_size, int tile_size);
+
+// Consecutive rectangles whose tiles are listed at once.
+struct TileRun {
+  size_t begin = 0;
+  size_t end = 0;
+
+  [[nodiscard]] size_t size() const { return end - begin; }
+};
+
+struct RunLimits {
+  size_t rects = 1U << 18U;
+  size_t entries = 1U << 22U;  // exceeded only by a single rectangle
+};
+
+// Cuts rectangles into the fewest runs within the limits, in order; none for none.
+std::vector<TileRun> CutIntoRuns(std::span<const Rect> rects, int tile_size,
+                                 const RunLimits& limits);
 
 }  // namespace halflight::sweep

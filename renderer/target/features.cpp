@@ -70,14 +70,10 @@ double MeanProfile(Profile profile) {
 
 // Half-angle slicing needs such a light outside the cloud; bounds of the largest particles serve.
 bool IsAmong(const PointLight& light, const ParticleView& particles) {
-  double largest = particles.uniform_radius();
-  for (const float radius : particles.set().radii) {
-    largest = std::max(largest, static_cast<double>(radius));
-  }
   const OffsetBounds& bounds = particles.bounds();
   const glm::dvec3 center = particles.set().origin + bounds.center();
   return glm::distance(light.position, center) <=
-         0.5 * glm::distance(bounds.low, bounds.high) + largest;
+         0.5 * glm::distance(bounds.low, bounds.high) + particles.largest_radius();
 }
 
 LightFeatures FeaturesOf(const Light& light, const Scene& scene, const ParticleView& particles,

@@ -1,8 +1,10 @@
 #include "renderer/techniques/half_angle.h"
 
 #include <utility>
+#include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "renderer/bands.h"
 #include "renderer/frame_engine.h"
 #include "renderer/frame_images.h"
 #include "renderer/gl/debug.h"
@@ -34,22 +36,14 @@ void DescribePasses(FramePlan& plan) {
         plan.passes.push_back(std::move(pass));
       }
     } else {
-      plan.passes.push_back({traversal.axis ? "sort by depth" : "sort by distance from the eye",
-                             "nothing casts shadows", 1});
+      plan.passes.push_back(DescribeSort(traversal));
       plan.passes.push_back({"project particles for the eye", "every traversal", 1});
       plan.passes.push_back({"composite", "the image", 1});
     }
   }
 }
 
-absl::Status CheckTargetSize(const FramePlan& plan, const DeviceInfo& device) {
-  for (const int side : {plan.composite_size.x, plan.composite_size.y}) {
-    if (side > device.max_texture_size) {
-      return absl::InvalidArgumentError(absl::StrCat("camera size times sampling: ", side,
-                                                     " pixels, allowed on ", device.gl_renderer,
-                                                     ": at most ", device.max_texture_size));
-    }
-  }
+absl::Status CheckLightBuffers(const FramePlan& plan, const DeviceInfo& device) {
   for (const Traversal& traversal : plan.traversals) {
     if (traversal.light_buffer_size > device.max_texture_size) {
       return absl::InvalidArgumentError(
@@ -62,34 +56,47 @@ absl::Status CheckTargetSize(const FramePlan& plan, const DeviceInfo& device) {
 
 absl::Status DrawUnshadowed(const TraversalContext& context) {
   context.clock.BeginCpu("sort");
-  const ParticleOrder order =
-      OrderParticles(context.particles, context.traversal,
-                     context.eye.projection.eye() - context.particles.set().origin);
+  const auto order = SortForTraversal(context);
+  if (!order.ok()) return order.status();
   context.clock.BeginGpu("project");
-  const OrderBuffers order_buffers = UploadOrder(order);
   absl::StatusOr<gl::Buffer> splats = ProjectParticles(
-      context.gpu, context.buffers, order_buffers, context.eye, "project particles for the eye");
+      context.gpu, context.buffers, **order, context.eye, "project particles for the eye");
   if (!splats.ok()) return splats.status();
   context.clock.BeginGpu("light and composite");
   const CompositePass composite =
-      PrepareComposite(context.scene, context.traversal, order_buffers, context.buffers,
-                       context.eye, *splats, nullptr, nullptr, context.target);
-  return CompositeSlice(context.gpu, composite, 0, static_cast<uint32_t>(order.particles.size()),
-                        nullptr, context.target);
+      PrepareComposite(context.scene, context.traversal, **order, context.buffers,
+                       context.eye.projection, *splats, nullptr, nullptr, context.targets.front());
+  return CompositeSlice(context.gpu, composite, 0, (*order)->count(), nullptr, context.targets);
 }
 
-// Reads a target back, resolved to the image's size where sampling asks for it.
-absl::StatusOr<Image> ReadResolved(Gpu& gpu, const gl::Texture& samples, const Sampling& sampling,
-                                   const FramePlan& plan) {
-  if (sampling.supersample == 1 && sampling.downsample == 1) return ReadTexture(samples);
-  absl::StatusOr<gl::Texture> pixels = ResolveSamples(gpu, samples, sampling, plan.window_size);
-  if (!pixels.ok()) return pixels.status();
-  return ReadTexture(*pixels);
+// Reads one texture of every band back, resolved where sampling asks for it, as one image.
+absl::StatusOr<Image> ReadBands(const TraversalContext& context, const FramePlan& plan,
+                                const std::vector<Band>& bands,
+                                gl::Texture CompositeTarget::*texture) {
+  const Sampling& sampling = context.scene.sampling;
+  Image image{plan.window_size.x, plan.window_size.y, 1, {"R", "G", "B", "A"}, {}};
+  for (size_t b = 0; b < bands.size(); ++b) {
+    const gl::Texture& samples = context.targets[b].*texture;
+    gl::Texture resolved;
+    if (sampling.supersample > 1 || sampling.downsample > 1) {
+      absl::StatusOr<gl::Texture> pixels =
+          ResolveSamples(context.gpu, samples, sampling, bands[b], plan.composite_size);
+      if (!pixels.ok()) return pixels.status();
+      resolved = *std::move(pixels);
+    }
+    Image part = ReadTexture(resolved ? resolved : samples);
+    if (bands.size() == 1) return part;
+    image.pixels.resize(size_t{4} * static_cast<size_t>(image.width) *
+                        static_cast<size_t>(image.height));
+    CopyBand(part, bands[b], image);
+  }
+  return image;
 }
 
 // Draws one traversal and reads back what it adds to the frame.
 absl::Status DrawTraversal(const TraversalContext& context, const FramePlan& plan,
-                           std::vector<LightReport>& reports, DrawnImages& drawn) {
+                           const std::vector<Band>& bands, std::vector<LightReport>& reports,
+                           DrawnImages& drawn) {
   const Traversal& traversal = context.traversal;
   if (traversal.shadow_light) {
     const auto light = static_cast<size_t>(*traversal.shadow_light);
@@ -101,22 +108,21 @@ absl::Status DrawTraversal(const TraversalContext& context, const FramePlan& pla
   }
 
   context.clock.BeginCpu("readback");
-  const Sampling& sampling = context.scene.sampling;
-  absl::StatusOr<Image> image = ReadResolved(context.gpu, context.target.image, sampling, plan);
+  absl::StatusOr<Image> image = ReadBands(context, plan, bands, &CompositeTarget::image);
   if (!image.ok()) return image.status();
   if (drawn.beauty.pixels.empty()) {
     drawn.beauty = *std::move(image);
   } else {
     AddColors(*image, drawn.beauty);
   }
-  if (context.target.depth) {
-    absl::StatusOr<Image> depth = ReadResolved(context.gpu, context.target.depth, sampling, plan);
+  if (context.targets.front().depth) {
+    absl::StatusOr<Image> depth = ReadBands(context, plan, bands, &CompositeTarget::depth);
     if (!depth.ok()) return depth.status();
     drawn.depth = *std::move(depth);
   }
-  if (context.target.transmittance) {
+  if (context.targets.front().transmittance) {
     absl::StatusOr<Image> transmittance =
-        ReadResolved(context.gpu, context.target.transmittance, sampling, plan);
+        ReadBands(context, plan, bands, &CompositeTarget::transmittance);
     if (!transmittance.ok()) return transmittance.status();
     drawn.transmittance[static_cast<size_t>(*traversal.shadow_light)] = *std::move(transmittance);
   }
@@ -125,10 +131,16 @@ absl::Status DrawTraversal(const TraversalContext& context, const FramePlan& pla
 
 }  // namespace
 
+absl::Status HalfAngle::Check(const FrameRequest& request) const {
+  return CheckLightCount(request.scene);
+}
+
 absl::Status HalfAngle::Plan(const FrameRequest& request, const ParticleView& particles,
                              FramePlan& plan) const {
   const Scene& scene = request.scene;
-  if (absl::Status status = CheckLightCount(scene); !status.ok()) return status;
+  if (absl::Status status = CheckLightsOutside(scene, particles, "HALF_ANGLE"); !status.ok()) {
+    return status;
+  }
 
   // One traversal for each light that casts shadows: each has an axis of its own.
   std::vector<int> unshadowed;
@@ -137,11 +149,10 @@ absl::Status HalfAngle::Plan(const FrameRequest& request, const ParticleView& pa
       unshadowed.push_back(light);
       continue;
     }
-    absl::StatusOr<Traversal> traversal = PlanHalfAngleLight(scene, particles, light);
-    if (!traversal.ok()) return traversal.status();
-    traversal->shadow_light = light;
-    KeepWhatOutputsShow(request.images, *traversal);
-    plan.traversals.push_back(*std::move(traversal));
+    Traversal traversal = PlanHalfAngleLight(scene, particles, light);
+    traversal.shadow_light = light;
+    KeepWhatOutputsShow(request.images, traversal);
+    plan.traversals.push_back(std::move(traversal));
   }
   // Without shadows: one walk in the order of distance from the eye, as the image model asks; of
   // parallel rays, each from an eye of its own, that is the depth along them.
@@ -161,12 +172,13 @@ absl::Status HalfAngle::Plan(const FrameRequest& request, const ParticleView& pa
 absl::StatusOr<DrawnFrame> HalfAngle::Draw(const DrawContext& context) const {
   const Scene& scene = context.request.scene;
   const FramePlan& plan = context.plan;
-  if (absl::Status status = CheckTargetSize(plan, context.device); !status.ok()) return status;
+  if (absl::Status status = CheckLightBuffers(plan, context.device); !status.ok()) return status;
   gl::ForgetErrors();
 
   // Bring particles and camera to the device.
   context.clock.BeginCpu("upload");
-  const ParticleBuffers buffers = UploadParticles(context.particles);
+  const auto buffers = ParticlesOnDevice(context.cache, scene, context.particles);
+  if (!buffers.ok()) return buffers.status();
   const double samples = static_cast<double>(scene.sampling.supersample) /
                          static_cast<double>(scene.sampling.downsample);
   Projection eye_projection = EyeProjection(scene.camera, plan.composite_size, samples);
@@ -177,23 +189,41 @@ absl::StatusOr<DrawnFrame> HalfAngle::Draw(const DrawContext& context) const {
   DrawnImages drawn;
   drawn.transmittance.resize(scene.lights.size());
   drawn.shadows.resize(scene.lights.size());
-  std::vector<LightReport> reports(scene.lights.size());
+  DrawnFrame frame;
+  frame.reports.resize(scene.lights.size());
+  const std::vector<Band> bands = CutIntoBands(plan.window_size, plan.composite_size,
+                                               scene.sampling, context.device.max_texture_size);
   for (size_t t = 0; t < plan.traversals.size(); ++t) {
     if (context.stop.stop_requested()) return absl::CancelledError("frame cancelled");
     const Traversal& traversal = plan.traversals[t];
     context.clock.BeginGpu("clear");
-    const CompositeTarget target = MakeCompositeTarget(
-        plan.composite_size, plan.keep_depth && t == 0, traversal.keep_transmittance);
-    const TraversalContext walk{context.gpu, scene,  traversal,     context.particles, buffers,
-                                eye,         target, context.clock, context.stop};
-    if (absl::Status status = DrawTraversal(walk, plan, reports, drawn); !status.ok()) {
+    std::vector<CompositeTarget> targets;
+    for (const Band& band : bands) {
+      targets.push_back(MakeCompositeTarget(eye_projection, context.particles, band.samples,
+                                            plan.keep_depth && t == 0,
+                                            traversal.keep_transmittance));
+    }
+    const TraversalContext walk{.gpu = context.gpu,
+                                .cache = context.cache,
+                                .scene = scene,
+                                .traversal = traversal,
+                                .particles = context.particles,
+                                .buffers = **buffers,
+                                .eye = eye,
+                                .targets = targets,
+                                .reused = frame.reused,
+                                .clock = context.clock,
+                                .stop = context.stop};
+    if (absl::Status status = DrawTraversal(walk, plan, bands, frame.reports, drawn);
+        !status.ok()) {
       return status;
     }
   }
   if (absl::Status status = gl::CheckErrors("frame"); !status.ok()) return status;
 
   context.clock.BeginCpu("images");
-  return DrawnFrame{SelectImages(context.request, drawn), std::move(reports)};
+  frame.images = SelectImages(context.request, drawn);
+  return frame;
 }
 
 }  // namespace halflight

@@ -8,6 +8,7 @@ namespace halflight {
 
 class HalfAngle : public ShadowTechnique {
  public:
+  [[nodiscard]] absl::Status Check(const FrameRequest& request) const override;
   absl::Status Plan(const FrameRequest& request, const ParticleView& particles,
                     FramePlan& plan) const override;
   [[nodiscard]] absl::StatusOr<DrawnFrame> Draw(const DrawContext& context) const override;

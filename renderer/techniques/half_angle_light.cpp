@@ -110,16 +110,8 @@ HalfAngleAxis ComputeHalfAngleAxis(const glm::dvec3& view, const glm::dvec3& lig
   return {glm::normalize(light - view), true};
 }
 
-absl::StatusOr<Traversal> PlanHalfAngleLight(const Scene& scene, const ParticleView& particles,
-                                             int light) {
+Traversal PlanHalfAngleLight(const Scene& scene, const ParticleView& particles, int light) {
   const Light& source = scene.lights[static_cast<size_t>(light)];
-  if (LiesAmong(source, particles)) {
-    const glm::dvec3& at = std::get<PointLight>(source.kind).position;
-    return absl::InvalidArgumentError(absl::StrCat(
-        "lighting.lights[", light, "].point.position: (", at.x, ", ", at.y, ", ", at.z,
-        "), allowed: outside the particles, for a light that casts shadows under technique "
-        "HALF_ANGLE"));
-  }
   const HalfAngleAxis half_angle =
       ComputeHalfAngleAxis(ViewDirection(scene.camera), TravelDirection(source, particles));
   Traversal traversal;
@@ -136,13 +128,31 @@ absl::StatusOr<Traversal> PlanHalfAngleLight(const Scene& scene, const ParticleV
   return traversal;
 }
 
+absl::StatusOr<std::shared_ptr<const DeviceOrder>> SortForTraversal(
+    const TraversalContext& context) {
+  const Traversal& traversal = context.traversal;
+  bool made = false;
+  auto order = OrderOnDevice(context.cache, context.scene, context.particles, traversal,
+                             context.eye.projection.eye() - context.particles.set().origin, made);
+  if (!made) context.reused.push_back(DescribeSort(traversal));
+  return order;
+}
+
+PlannedPass DescribeSort(const Traversal& traversal) {
+  if (!traversal.shadow_light) {
+    return {traversal.axis ? "sort by depth" : "sort by distance from the eye",
+            "nothing casts shadows", 1};
+  }
+  return {traversal.back_to_front ? "sort along the half vector, back to front"
+                                  : "sort along the half vector, front to back",
+          absl::StrCat("light ", *traversal.shadow_light, " casts shadows"), 1};
+}
+
 std::vector<PlannedPass> DescribeHalfAnglePasses(const Traversal& traversal) {
   const std::string light = absl::StrCat("light ", *traversal.shadow_light, " casts shadows");
   const int slices = traversal.slices;
   std::vector<PlannedPass> passes = {
-      {traversal.back_to_front ? "sort along the half vector, back to front"
-                               : "sort along the half vector, front to back",
-       light, 1},
+      DescribeSort(traversal),
       {"project particles for the eye", "every traversal", 1},
       {"project particles for the light", light, 1},
   };
@@ -164,8 +174,9 @@ absl::StatusOr<ShadowResult> DrawHalfAngleLight(const TraversalContext& context,
 
   // Sort the particles along the axis, and fit the light's camera to them.
   context.clock.BeginCpu("sort");
-  const ParticleOrder order = OrderParticles(
-      context.particles, traversal, context.eye.projection.eye() - context.particles.set().origin);
+  const auto sorted = SortForTraversal(context);
+  if (!sorted.ok()) return sorted.status();
+  const DeviceOrder& order = **sorted;
   context.clock.BeginCpu("light camera");
   std::optional<Spread> spread;
   if (traversal.blur) {
@@ -187,21 +198,20 @@ absl::StatusOr<ShadowResult> DrawHalfAngleLight(const TraversalContext& context,
 
   // Project them for the eye and for the light.
   context.clock.BeginGpu("project");
-  const OrderBuffers order_buffers = UploadOrder(order);
   const TargetProjection light = UploadProjection(light_projection, context.particles);
-  absl::StatusOr<gl::Buffer> eye_splats = ProjectParticles(
-      gpu, context.buffers, order_buffers, context.eye, "project particles for the eye");
+  absl::StatusOr<gl::Buffer> eye_splats =
+      ProjectParticles(gpu, context.buffers, order, context.eye, "project particles for the eye");
   if (!eye_splats.ok()) return eye_splats.status();
-  absl::StatusOr<gl::Buffer> light_splats = ProjectParticles(
-      gpu, context.buffers, order_buffers, light, "project particles for the light");
+  absl::StatusOr<gl::Buffer> light_splats =
+      ProjectParticles(gpu, context.buffers, order, light, "project particles for the light");
   if (!light_splats.ok()) return light_splats.status();
 
   // Slice by slice: let the light spread up to the slice, deposit the slice, draw it.
   context.clock.BeginGpu("light and composite");
   LightBuffers buffers(traversal);
   const CompositePass composite =
-      PrepareComposite(context.scene, traversal, order_buffers, context.buffers, context.eye,
-                       *eye_splats, &light, &*light_splats, context.target);
+      PrepareComposite(context.scene, traversal, order, context.buffers, context.eye.projection,
+                       *eye_splats, &light, &*light_splats, context.targets.front());
   const glm::dvec2 texels_per_unit = TexelsPerUnit(light_projection, context.particles);
   const auto blur = [&](double from, double to) {
     return BlurLightBuffer(gpu, buffers.before, buffers.scratch,
@@ -221,12 +231,12 @@ absl::StatusOr<ShadowResult> DrawHalfAngleLight(const TraversalContext& context,
     }
     LightBuffer& deposit_into = traversal.interpolate ? buffers.after : buffers.before;
     const auto deposit = [&] {
-      return DepositSlice(gpu, order_buffers, *light_splats, light, context.scene.material.profile,
+      return DepositSlice(gpu, *light_splats, light, context.scene.material.profile,
                           ChannelsOf(traversal), begin, end, deposit_into);
     };
     const auto draw = [&] {
       const SliceLight slice_light{buffers.before, deposit_into};
-      return CompositeSlice(gpu, composite, begin, end, &slice_light, context.target);
+      return CompositeSlice(gpu, composite, begin, end, &slice_light, context.targets);
     };
     // Plain slicing sees the light without its own slice, interpolation the light on both sides.
     absl::Status status;

@@ -4,6 +4,7 @@
 // the light buffer, and into the light buffer.
 #pragma once
 
+#include <memory>
 #include <vector>
 
 #include "absl/status/statusor.h"
@@ -22,11 +23,17 @@ struct HalfAngleAxis {
 };
 HalfAngleAxis ComputeHalfAngleAxis(const glm::dvec3& view, const glm::dvec3& light);
 
-// How light number `light` of the scene will be drawn: axis, slices, light buffer. No GL.
-// InvalidArgument, naming the field, for a shadow-casting light among the particles.
-absl::StatusOr<Traversal> PlanHalfAngleLight(const Scene& scene, const ParticleView& particles,
-                                             int light);
+// How light number `light` of the scene, which lies outside the particles, will be drawn: axis,
+// slices, light buffer. No GL.
+Traversal PlanHalfAngleLight(const Scene& scene, const ParticleView& particles, int light);
 
+// The traversal's order of particles, which an earlier frame may have left; then it says so in
+// `context.reused`.
+absl::StatusOr<std::shared_ptr<const DeviceOrder>> SortForTraversal(
+    const TraversalContext& context);
+
+// How a traversal's particles are sorted, for people.
+PlannedPass DescribeSort(const Traversal& traversal);
 // The passes that the traversal comes to, for people.
 std::vector<PlannedPass> DescribeHalfAnglePasses(const Traversal& traversal);
 

@@ -1,10 +1,14 @@
 #include "renderer/techniques/light_sweep.h"
 
-#include <optional>
+#include <algorithm>
+#include <memory>
+#include <span>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "renderer/frame_cache.h"
 #include "renderer/frame_engine.h"
 #include "renderer/frame_images.h"
 #include "renderer/stage_clock.h"
@@ -18,34 +22,7 @@ namespace halflight {
 
 namespace {
 
-absl::Status Refuse(const std::string& field, const std::string& value, const char* allowed) {
-  return absl::InvalidArgumentError(
-      absl::StrCat(field, ": ", value, ", allowed under technique LIGHT_SWEEP: ", allowed));
-}
-
-absl::Status CheckRequest(const FrameRequest& request) {
-  const Scene& scene = request.scene;
-  if (scene.shadow.blur_mode == BlurMode::kTexelsPerSlice && scene.shadow.blur_texels > 0.0F) {
-    return Refuse("shadow.blur_texels", absl::StrCat(scene.shadow.blur_texels),
-                  "0, since it has no slices to blur between");
-  }
-  if (scene.material.scattering_spread > 0.0F) {
-    return Refuse("material.scattering_spread", absl::StrCat(scene.material.scattering_spread),
-                  "0, since it has no slices to blur between");
-  }
-  if (scene.material.scatters_physically()) {
-    return Refuse("material.physical_scattering.albedo",
-                  absl::StrCat(scene.material.physical_scattering->albedo),
-                  "0, since it has no slices to blur between");
-  }
-  for (const ImageRequest& image : request.images) {
-    if (image.kind == ImageKind::kLightLayers) {
-      return Refuse("outputs", "light layers",
-                    "beauty, coverage, depth, light transmittance, light buffer");
-    }
-  }
-  return absl::OkStatus();
-}
+constexpr char kName[] = "LIGHT_SWEEP";
 
 bool DrawsOnDevice(const DrawContext& context) {
   const SweepOn where = context.request.sweep_on;
@@ -53,33 +30,113 @@ bool DrawsOnDevice(const DrawContext& context) {
 }
 
 bool Shows(const FrameRequest& request, ImageKind kind) {
-  for (const ImageRequest& image : request.images) {
-    if (image.kind == kind) return true;
+  return std::any_of(request.images.begin(), request.images.end(),
+                     [kind](const ImageRequest& image) { return image.kind == kind; });
+}
+
+std::vector<PlannedPass> LightPasses(size_t light) {
+  const std::string reason = absl::StrCat("light ", light, " casts shadows");
+  return {{"sort along the light", reason, 1},
+          {"sweep the light buffer through the particles", reason, 1},
+          {"fit the light over every footprint", reason, 1}};
+}
+
+const PlannedPass& EyeSort() {
+  static const PlannedPass pass{"sort by distance from the eye", "the image", 1};
+  return pass;
+}
+
+// What a fit depends on: of the light, where it is and not how it shines.
+struct LightFitKey {
+  using Value = sweep::LightFit;
+  ParticleViewKey particles;
+  bool point = false;
+  glm::dvec3 place{0.0};  // its position, or its direction
+  Profile profile = Profile::kSoft;
+  int light_buffer_size = 0;
+  int degree = 0;
+
+  bool operator==(const LightFitKey&) const = default;
+};
+
+LightFitKey LightFitKeyOf(const Scene& scene, const Light& light) {
+  LightFitKey key{.particles = ParticleViewKeyOf(scene),
+                  .profile = scene.material.profile,
+                  .light_buffer_size = scene.shadow.light_buffer_size,
+                  .degree = scene.shadow.fit_degree};
+  if (const auto* const point = std::get_if<PointLight>(&light.kind)) {
+    key.point = true;
+    key.place = point->position;
+  } else {
+    key.place = std::get<DirectionalLight>(light.kind).direction;
   }
-  return false;
+  return key;
+}
+
+struct SpriteListKey {
+  using Value = sweep::SpriteList;
+  ParticleViewKey particles;
+  Projection eye;
+  double near_depth = 0.0;
+
+  bool operator==(const SpriteListKey&) const = default;
+};
+
+// Of a list that is one run. Those of more take much room, and little time against what else such a
+// frame needs.
+struct TileListsKey {
+  using Value = sweep::TileLists;
+  SpriteListKey list;
+
+  bool operator==(const TileListsKey&) const = default;
+};
+
+// The light's fit, from an earlier frame or made now.
+absl::StatusOr<std::shared_ptr<const sweep::LightFit>> FitOf(const DrawContext& context,
+                                                             size_t light, DrawnFrame& frame) {
+  const Scene& scene = context.request.scene;
+  bool made = false;
+  auto fit =
+      context.cache.FindOrMake(scene.particles, LightFitKeyOf(scene, scene.lights[light]), [&] {
+        made = true;
+        return sweep::FitLight(scene.lights[light], context.particles, scene.material.profile,
+                               scene.shadow.light_buffer_size, scene.shadow.fit_degree,
+                               context.stop);
+      });
+  if (!made) {
+    for (PlannedPass& pass : LightPasses(light)) frame.reused.push_back(std::move(pass));
+  }
+  return fit;
 }
 
 }  // namespace
 
+absl::Status LightSweep::Check(const FrameRequest& request) const {
+  const Scene& scene = request.scene;
+  if (absl::Status status = CheckLightCount(scene); !status.ok()) return status;
+  if (Shows(request, ImageKind::kLightLayers)) {
+    return Refuse("outputs", "light layers", kName,
+                  "beauty, coverage, depth, light transmittance, light buffer");
+  }
+  const glm::ivec2 size = CompositeSize(scene.camera.window, scene.sampling);
+  if (std::max(size.x, size.y) > sweep::kMaxTargetSide) {
+    return Refuse("camera size times sampling", absl::StrCat(std::max(size.x, size.y), " pixels"),
+                  kName, absl::StrCat("at most ", sweep::kMaxTargetSide));
+  }
+  return CheckNoScattering(scene, kName, "it has no slices to blur between");
+}
+
 absl::Status LightSweep::Plan(const FrameRequest& request, const ParticleView& particles,
                               FramePlan& plan) const {
-  if (absl::Status status = CheckLightCount(request.scene); !status.ok()) return status;
-  if (absl::Status status = CheckRequest(request); !status.ok()) return status;
-  const std::vector<Light>& lights = request.scene.lights;
-  for (size_t l = 0; l < lights.size(); ++l) {
-    if (!lights[l].casts_shadows()) continue;
-    if (LiesAmong(lights[l], particles)) {
-      const glm::dvec3& at = std::get<PointLight>(lights[l].kind).position;
-      return Refuse(absl::StrCat("lighting.lights[", l, "].point.position"),
-                    absl::StrCat("(", at.x, ", ", at.y, ", ", at.z, ")"),
-                    "outside the particles, for a light that casts shadows");
-    }
-    const std::string light = absl::StrCat("light ", l, " casts shadows");
-    plan.passes.push_back({"sort along the light", light, 1});
-    plan.passes.push_back({"sweep the light buffer through the particles", light, 1});
-    plan.passes.push_back({"fit the light over every footprint", light, 1});
+  const Scene& scene = request.scene;
+  if (absl::Status status = CheckLightsOutside(scene, particles, kName); !status.ok()) {
+    return status;
   }
-  plan.passes.push_back({"sort by distance from the eye", "the image", 1});
+  for (size_t l = 0; l < scene.lights.size(); ++l) {
+    if (!scene.lights[l].casts_shadows()) continue;
+    for (PlannedPass& pass : LightPasses(l)) plan.passes.push_back(std::move(pass));
+  }
+  plan.passes.push_back(EyeSort());
   plan.passes.push_back({"composite tiles", "the image", 1});
   return absl::OkStatus();
 }
@@ -93,60 +150,88 @@ absl::StatusOr<DrawnFrame> DrawOnCpu(const DrawContext& context) {
   StageClock& clock = context.clock;
   const Scene& scene = request.scene;
   const size_t lights = scene.lights.size();
+  DrawnFrame frame;
+  frame.reports.resize(lights);
   DrawnImages drawn;
   drawn.transmittance.resize(lights);
   drawn.shadows.resize(lights);
-  std::vector<LightReport> reports(lights);
 
   // Sweep every light that casts shadows through the particles.
   clock.BeginCpu("light");
-  std::vector<std::optional<sweep::LightFit>> fits(lights);
+  std::vector<std::shared_ptr<const sweep::LightFit>> fits(lights);
   std::vector<const sweep::LightFit*> fit_of(lights, nullptr);
   for (size_t l = 0; l < lights; ++l) {
     if (!scene.lights[l].casts_shadows()) continue;
-    absl::StatusOr<sweep::LightFit> fit =
-        sweep::FitLight(scene.lights[l], particles, scene.material.profile,
-                        scene.shadow.light_buffer_size, scene.shadow.fit_degree, context.stop);
+    auto fit = FitOf(context, l, frame);
     if (!fit.ok()) return fit.status();
-    reports[l].casts_shadows = true;
-    reports[l].light_texture_from_world = fit->projection.texture_from_world();
-    reports[l].light_view_from_world = fit->projection.view_from_world;
-    drawn.shadows[l].light_buffer = std::move(fit->optical_depth);
     fits[l] = *std::move(fit);
-    fit_of[l] = &*fits[l];
+    fit_of[l] = fits[l].get();
+    frame.reports[l].casts_shadows = true;
+    frame.reports[l].light_texture_from_world = fits[l]->projection.texture_from_world();
+    frame.reports[l].light_view_from_world = fits[l]->projection.view_from_world;
   }
 
-  // See the particles from the eye, in the light.
+  // See the particles from the eye.
   clock.BeginCpu("project");
   const double samples = static_cast<double>(scene.sampling.supersample) /
                          static_cast<double>(scene.sampling.downsample);
   const Projection eye = EyeProjection(scene.camera, plan.composite_size, samples);
-  const sweep::SpriteList list = sweep::ListSprites(particles, eye, sweep::NearDepth(scene));
-  clock.BeginCpu("shade");
+  const SpriteListKey list_key{ParticleViewKeyOf(scene), eye, sweep::NearDepth(scene)};
+  frame.reused.push_back(EyeSort());
+  const auto list = context.cache.FindOrMake(
+      scene.particles, list_key, [&]() -> absl::StatusOr<sweep::SpriteList> {
+        frame.reused.pop_back();
+        return sweep::ListSprites(particles, eye, list_key.near_depth);
+      });
+  if (!list.ok()) return list.status();
+
+  // Run by run, shade them and draw them behind those that are nearer.
   const bool keep_transmittance = Shows(request, ImageKind::kLightTransmittance);
-  const sweep::Shading shading =
-      sweep::ShadeSprites(scene, particles, eye, list, fit_of, scene.shadow.fit_degree,
-                          plan.keep_depth, keep_transmittance);
-  clock.BeginCpu("composite");
-  absl::StatusOr<sweep::Composite> composite = sweep::CompositeTiles(
-      list, shading, eye, scene.material.profile, keep_transmittance, context.stop);
-  if (!composite.ok()) return composite.status();
+  const std::vector<sweep::TileLight> tile_lights =
+      sweep::ListTileLights(scene, keep_transmittance);
+  sweep::Composite composite = sweep::MakeComposite(plan.composite_size, plan.keep_depth,
+                                                    keep_transmittance ? tile_lights.size() : 0);
+  const std::vector<sweep::TileRun> runs =
+      sweep::CutIntoRuns((*list)->rects, sweep::kImageTile, {});
+  FrameCache nothing_kept(0);
+  FrameCache& cache_of_tiles = runs.size() == 1 ? context.cache : nothing_kept;
+  for (const sweep::TileRun& run : runs) {
+    clock.BeginCpu("project");
+    const auto tiles = cache_of_tiles.FindOrMake(
+        scene.particles, TileListsKey{list_key}, [&]() -> absl::StatusOr<sweep::TileLists> {
+          return sweep::ListTiles(std::span((*list)->rects).subspan(run.begin, run.size()),
+                                  eye.size, sweep::kImageTile);
+        });
+    if (!tiles.ok()) return tiles.status();
+    clock.BeginCpu("shade");
+    const sweep::Shading shading =
+        sweep::ShadeSprites(scene, particles, eye, **list, run, tile_lights, fit_of,
+                            scene.shadow.fit_degree, plan.keep_depth);
+    clock.BeginCpu("composite");
+    if (!sweep::CompositeRun(**list, **tiles, shading, eye, scene.material.profile, context.stop,
+                             composite)) {
+      return absl::CancelledError("frame cancelled");
+    }
+  }
 
   const auto resample = [&](Image image) {
     return sweep::Resample(std::move(image), scene.sampling, plan.window_size);
   };
-  drawn.beauty = resample(std::move(composite->beauty));
-  if (plan.keep_depth) drawn.depth = resample(std::move(composite->depth));
-  if (keep_transmittance) {
-    for (size_t l = 0; l < lights; ++l) {
-      if (fit_of[l] == nullptr) continue;
-      const auto slot =
-          static_cast<size_t>(sweep::TransmittanceSlot(shading.lights, static_cast<int>(l)));
-      drawn.transmittance[l] = resample(composite->transmittance[slot]);
+  drawn.beauty = resample(std::move(composite.beauty));
+  if (plan.keep_depth) drawn.depth = resample(std::move(composite.depth));
+  for (size_t l = 0; l < lights; ++l) {
+    if (fit_of[l] == nullptr) continue;
+    if (keep_transmittance) {
+      drawn.transmittance[l] = resample(composite.transmittance[static_cast<size_t>(
+          sweep::TransmittanceSlot(tile_lights, static_cast<int>(l)))]);
+    }
+    if (Shows(request, ImageKind::kLightBuffer)) {
+      drawn.shadows[l].light_buffer = fits[l]->optical_depth;
     }
   }
   clock.BeginCpu("images");
-  return DrawnFrame{SelectImages(request, drawn), std::move(reports)};
+  frame.images = SelectImages(request, drawn);
+  return frame;
 }
 
 }  // namespace

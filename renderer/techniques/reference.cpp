@@ -13,16 +13,13 @@ namespace halflight {
 
 namespace {
 
-absl::Status Refuse(const std::string& field, const std::string& value, const char* allowed) {
-  return absl::InvalidArgumentError(
-      absl::StrCat(field, ": ", value, ", allowed under technique REFERENCE: ", allowed));
-}
+constexpr char kName[] = "REFERENCE";
 
 absl::Status CheckOutputs(const std::vector<ImageRequest>& images) {
   for (const ImageRequest& image : images) {
     if (image.kind == ImageKind::kLightBuffer || image.kind == ImageKind::kLightLayers) {
       return Refuse("outputs",
-                    image.kind == ImageKind::kLightBuffer ? "light buffer" : "light layers",
+                    image.kind == ImageKind::kLightBuffer ? "light buffer" : "light layers", kName,
                     "beauty, coverage, depth, light transmittance");
     }
   }
@@ -31,23 +28,10 @@ absl::Status CheckOutputs(const std::vector<ImageRequest>& images) {
 
 absl::Status CheckScene(const Scene& scene) {
   if (scene.sampling.downsample > 1) {
-    return Refuse("sampling.downsample", absl::StrCat(scene.sampling.downsample),
+    return Refuse("sampling.downsample", absl::StrCat(scene.sampling.downsample), kName,
                   "1, since it samples every pixel");
   }
-  if (scene.shadow.blur_mode == BlurMode::kTexelsPerSlice) {
-    if (scene.shadow.blur_texels > 0.0F) {
-      return Refuse("shadow.blur_texels", absl::StrCat(scene.shadow.blur_texels),
-                    "0, since the image model has no scattering");
-    }
-  } else if (scene.material.scattering_spread > 0.0F) {
-    return Refuse("material.scattering_spread", absl::StrCat(scene.material.scattering_spread),
-                  "0, since the image model has no scattering");
-  } else if (scene.material.scatters_physically()) {
-    return Refuse("material.physical_scattering.albedo",
-                  absl::StrCat(scene.material.physical_scattering->albedo),
-                  "0, since the image model has no scattering");
-  }
-  return absl::OkStatus();
+  return CheckNoScattering(scene, kName, "the image model has no scattering");
 }
 
 // An image whose pixel i has `value(i, channel)`.
@@ -91,10 +75,13 @@ Image SelectImage(const ImageRequest& request, const Scene& scene,
 
 }  // namespace
 
-absl::Status Reference::Plan(const FrameRequest& request, const ParticleView& /*particles*/,
-                             FramePlan& plan) const {
+absl::Status Reference::Check(const FrameRequest& request) const {
   if (absl::Status status = CheckOutputs(request.images); !status.ok()) return status;
-  if (absl::Status status = CheckScene(request.scene); !status.ok()) return status;
+  return CheckScene(request.scene);
+}
+
+absl::Status Reference::Plan(const FrameRequest& /*request*/, const ParticleView& /*particles*/,
+                             FramePlan& plan) const {
   plan.passes.push_back(
       {"evaluate the image model in float64", "technique REFERENCE, on the CPU", 1});
   return absl::OkStatus();

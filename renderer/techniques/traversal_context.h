@@ -1,7 +1,9 @@
 // Everything that a traversal of the particles is given.
 #pragma once
 
+#include <span>
 #include <stop_token>
+#include <vector>
 
 #include "absl/status/statusor.h"
 #include "renderer/frame_plan.h"
@@ -15,12 +17,14 @@ namespace halflight {
 
 struct TraversalContext {
   Gpu& gpu;
+  FrameCache& cache;
   const Scene& scene;
   const Traversal& traversal;
   const ParticleView& particles;
   const ParticleBuffers& buffers;
   const TargetProjection& eye;
-  const CompositeTarget& target;
+  std::span<const CompositeTarget> targets;  // one for each band of the image
+  std::vector<PlannedPass>& reused;          // as in DrawnFrame
   StageClock& clock;
   std::stop_token stop;
 };

@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include "halflight/sha256.h"
+#include "renderer/shadow_technique.h"
 #include "server/convert/convert_scene.h"
 #include "server/convert/field_checks.h"
 #include "server/particle_upload.h"
@@ -59,7 +60,8 @@ absl::StatusOr<NamedParticles> ResolveParticles(const v1::Scene& scene, Particle
 }
 
 absl::StatusOr<FrameJob> ConvertFrame(const v1::RenderFrameRequest& request,
-                                      const NamedParticles& particles, const ServerLimits& limits) {
+                                      const NamedParticles& particles, const ServerLimits& limits,
+                                      const DeviceInfo& device) {
   FieldChecks checks;
   CheckRequestId(request.request_id(), checks);
   FrameJob job;
@@ -69,12 +71,16 @@ absl::StatusOr<FrameJob> ConvertFrame(const v1::RenderFrameRequest& request,
     CheckTarget(request, checks);
   }
   job.request.scene = ConvertScene(request.scene(), particles.set, limits, checks);
-  if (checks.ok() && !request.has_target()) {
-    CheckTechnique(job.request.scene, limits, checks);
-  }
   if (checks.ok()) {
-    const Scene& scene = job.request.scene;
+    Scene& scene = job.request.scene;
     OutputPlan plan = ConvertOutputs(request.outputs(), scene, limits, checks);
+    job.request.images = plan.images;
+    if (LeavesTechniqueOpen(request.scene().shadow())) {
+      scene.shadow.technique = DefaultTechnique(job.request, device.software);
+    }
+    if (checks.ok() && !request.has_target()) {
+      CheckTechnique(scene, limits, checks);
+    }
     if (checks.ok()) {
       job.measure = ConvertMeasurement(request, scene, limits, plan, checks);
     }
@@ -85,6 +91,8 @@ absl::StatusOr<FrameJob> ConvertFrame(const v1::RenderFrameRequest& request,
                                  limits, plan);
     }
     job.request.images = std::move(plan.images);
+    // What a search learns of costs shall hold for frames that nothing went before.
+    job.request.reuse = !request.has_target();
     job.outputs = std::move(plan.outputs);
     job.pixel_bytes = plan.pixel_bytes;
   }
@@ -95,12 +103,12 @@ absl::StatusOr<FrameJob> ConvertFrame(const v1::RenderFrameRequest& request,
 }
 
 absl::StatusOr<FrameJob> ConvertRequest(const v1::RenderFrameRequest& request, ParticleStore& store,
-                                        const ServerLimits& limits) {
+                                        const ServerLimits& limits, const DeviceInfo& device) {
   const auto particles = ResolveParticles(request.scene(), store, limits);
   if (!particles.ok()) {
     return particles.status();
   }
-  return ConvertFrame(request, *particles, limits);
+  return ConvertFrame(request, *particles, limits, device);
 }
 
 }  // namespace halflight

@@ -9,6 +9,7 @@
 #include "absl/status/statusor.h"
 #include "halflight/v1/service.pb.h"
 #include "renderer/frame.h"
+#include "renderer/frame_engine.h"
 #include "server/convert/convert_measurement.h"
 #include "server/convert/convert_outputs.h"
 #include "server/convert/convert_target.h"
@@ -36,12 +37,14 @@ absl::StatusOr<NamedParticles> ResolveParticles(const v1::Scene& scene, Particle
                                                 const ServerLimits& limits);
 
 // InvalidArgument "<path of the field>: <value>, allowed: <allowed>" for the first field that is
-// wrong. The scene's own particles are not looked at: `particles` stand for them.
+// wrong. The scene's own particles are not looked at: `particles` stand for them. `device` decides
+// on a technique that the request leaves open.
 absl::StatusOr<FrameJob> ConvertFrame(const v1::RenderFrameRequest& request,
-                                      const NamedParticles& particles, const ServerLimits& limits);
+                                      const NamedParticles& particles, const ServerLimits& limits,
+                                      const DeviceInfo& device);
 
 // Both of the above, for a request that stands alone.
 absl::StatusOr<FrameJob> ConvertRequest(const v1::RenderFrameRequest& request, ParticleStore& store,
-                                        const ServerLimits& limits);
+                                        const ServerLimits& limits, const DeviceInfo& device);
 
 }  // namespace halflight

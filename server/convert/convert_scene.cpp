@@ -240,6 +240,12 @@ Scene ConvertScene(const v1::Scene& scene, std::shared_ptr<const ParticleSet> pa
   return converted;
 }
 
+bool LeavesTechniqueOpen(const v1::Shadow& shadow) {
+  return shadow.technique() == v1::SHADOW_TECHNIQUE_UNSPECIFIED && shadow.slices() == 0 &&
+         !shadow.has_interpolate() && shadow.spacing() == v1::SLICE_SPACING_UNSPECIFIED &&
+         shadow.blur_mode() == v1::BLUR_MODE_UNSPECIFIED && shadow.blur_texels() == 0.0F;
+}
+
 void CheckTechnique(const Scene& scene, const ServerLimits& limits, FieldChecks& checks) {
   if (scene.shadow.technique != ShadowTechniqueKind::kReference) {
     CheckPointLights(scene, checks);

@@ -18,7 +18,11 @@ namespace halflight {
 Scene ConvertScene(const v1::Scene& scene, std::shared_ptr<const ParticleSet> particles,
                    const ServerLimits& limits, FieldChecks& checks);
 
-// What the technique that the scene names needs of it. The scene has passed its checks.
+// Whether the settings leave the technique open: it is unset, and so is all that only slices have
+// (slices, interpolate, spacing, blur_mode, blur_texels).
+bool LeavesTechniqueOpen(const v1::Shadow& shadow);
+
+// What the technique of the scene needs of it. The scene has passed its checks.
 void CheckTechnique(const Scene& scene, const ServerLimits& limits, FieldChecks& checks);
 
 // Rejects `field` where evaluating the image model at so many `pixels` of the scene goes beyond the

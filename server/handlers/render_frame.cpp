@@ -17,7 +17,7 @@ void RenderFrameHandler::Start(const v1::RenderFrameRequest& request) {
 }
 
 absl::Status RenderFrameHandler::Submit(const v1::RenderFrameRequest& request) {
-  auto job = ConvertRequest(request, backend_.store, backend_.limits);
+  auto job = ConvertRequest(request, backend_.store, backend_.limits, backend_.device);
   if (!job.ok()) {
     return job.status();
   }

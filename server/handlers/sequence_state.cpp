@@ -51,7 +51,7 @@ absl::StatusOr<FrameJob> SequenceState::Next(const v1::RenderFrameRequest& reque
     }
   }
   merged_.set_request_id(request.request_id());
-  auto job = ConvertFrame(merged_, *particles_, backend.limits);
+  auto job = ConvertFrame(merged_, *particles_, backend.limits, backend.device);
   if (job.ok() && job->target.has_value()) {
     job->target->knowledge = knowledge_;
   }

@@ -251,16 +251,5 @@ TEST_F(Frame, OfNoParticlesAtTheLightsPlaceReportsNumbers) {
   }
 }
 
-TEST_F(Frame, LargerThanTheDeviceAllowsIsRefusedByName) {
-  Scene scene = test::BallScene(10);
-  const int beyond = Renderer().device().max_texture_size + 1;
-  scene.camera.width = beyond;
-  scene.camera.window = {0, 0, beyond, 8};
-  const auto frame = Renderer().Render(test::Beauty(scene), {});
-  EXPECT_EQ(frame.status().code(), absl::StatusCode::kInvalidArgument);
-  EXPECT_NE(frame.status().message().find("camera size"), std::string::npos);
-  RenderBeauty(test::BallScene(10));  // still serves
-}
-
 }  // namespace
 }  // namespace halflight

@@ -3,6 +3,7 @@
 
 #include <cmath>
 
+#include "shaders/bindings.h"
 #include "tests/renderer/gl_fixture.h"
 
 namespace halflight {
@@ -45,6 +46,8 @@ double ExpectedCoverage(const ParticleCase& c, const Camera& camera, int x, int 
   const double w = c.profile == Profile::kSoft ? 1.0 - rho * rho : std::sqrt(1.0 - rho * rho);
   return -std::expm1(std::log1p(-static_cast<double>(c.opacity)) * w);
 }
+
+using ManyParticles = test::GlTest;
 
 class OneParticle : public test::GlTest, public testing::WithParamInterface<ParticleCase> {};
 
@@ -160,6 +163,24 @@ TEST_F(Particles, OfOpacityOneAreClampedAndCounted) {
   const FrameResult frame = Render(test::Beauty(scene));
   EXPECT_EQ(frame.clamped_opacities, 2U);
   for (const float value : frame.images[0].pixels) ASSERT_TRUE(std::isfinite(value));
+}
+
+// What the device is told of so many particles is larger than the smallest storage block that GL
+// guarantees (2^27 bytes): the last of them, farthest away, are drawn like the first.
+TEST_F(ManyParticles, AreDrawnToTheLast) {
+  constexpr size_t kCount = (size_t{1} << 27U) / 48 + 1000;  // 48: sizeof(shader::Splat)
+  static_assert(sizeof(shader::Splat) == 48);
+  auto set = std::make_shared<ParticleSet>();
+  set->positions.assign(kCount, glm::vec3(100.0F, 0.0F, 0.0F));  // beside the image
+  set->positions.back() = {0.0F, 0.0F, -200.0F};
+  Scene scene;
+  scene.particles = set;
+  scene.camera = test::LookAt({0, 0, 4}, {0, 0, 0}, 17, 17);
+  scene.material.radius = 40.0F;
+  scene.material.opacity = 0.5F;
+  scene.shadow.technique = ShadowTechniqueKind::kHalfAngle;
+  const Image beauty = RenderBeauty(scene);
+  EXPECT_NEAR(PixelAt(beauty, 8, 8)[3], 0.5F, 1e-6);
 }
 
 }  // namespace

@@ -15,7 +15,10 @@ double Median(std::vector<double> values) {
 absl::StatusOr<std::vector<TimedFrame>> TimeInTurns(FrameRenderer& renderer,
                                                     std::span<const Scene> scenes, int repeats) {
   std::vector<FrameRequest> requests;
-  for (const Scene& scene : scenes) requests.push_back({scene, {{ImageKind::kBeauty}}});
+  for (const Scene& scene : scenes) {
+    // Each as if it were the first of its scene.
+    requests.push_back({.scene = scene, .images = {{ImageKind::kBeauty}}, .reuse = false});
+  }
   std::vector<TimedFrame> frames(scenes.size());
   for (int turn = 0; turn <= repeats; ++turn) {
     for (size_t i = 0; i < requests.size(); ++i) {

@@ -92,11 +92,11 @@ TEST(ConvertMeasurement, CountsTheSamplesOfAMeasurementAgainstTheLimit) {
   MustConvert(request, limits);
   ParticleStore store(1 << 20);
   request.mutable_scene()->mutable_sampling()->set_supersample(2);
-  EXPECT_FALSE(ConvertRequest(request, store, limits).ok());
+  EXPECT_FALSE(ConvertRequest(request, store, limits, {}).ok());
   request.mutable_measure_error()->set_samples(32768);
   MustConvert(request, limits);
   request.add_outputs()->set_kind(v1::OUTPUT_KIND_ERROR);
-  EXPECT_FALSE(ConvertRequest(request, store, limits).ok()) << "every pixel of the window";
+  EXPECT_FALSE(ConvertRequest(request, store, limits, {}).ok()) << "every pixel of the window";
 }
 
 TEST(ConvertMeasurement, AndBackTellsTheErrorAndWhatWasCompared) {

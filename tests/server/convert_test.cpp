@@ -189,6 +189,60 @@ TEST(Bounds, HoldEveryParticleWithItsRadiusWhereItHasMovedTo) {
   EXPECT_FALSE(Bounds(ParticleSet{}, 0.5F, 0.0).has_value());
 }
 
+ShadowTechniqueKind TechniqueOf(const v1::RenderFrameRequest& request, bool software) {
+  ParticleStore store(1 << 20);
+  const auto job = ConvertRequest(request, store, {},
+                                  {.gl_renderer = "fake", .gl_version = {}, .software = software});
+  EXPECT_TRUE(job.ok()) << job.status();
+  return job.ok() ? job->request.scene.shadow.technique : ShadowTechniqueKind::kReference;
+}
+
+TEST(ConvertTechnique, IsTheSweepOnACpuWhereTheRequestLeavesItOpen) {
+  v1::RenderFrameRequest request = MakeRequest();
+  EXPECT_EQ(TechniqueOf(request, true), ShadowTechniqueKind::kLightSweep);
+  EXPECT_EQ(TechniqueOf(request, false), ShadowTechniqueKind::kHalfAngle);
+  request.mutable_scene()->mutable_shadow()->set_fit_degree(2);
+  request.mutable_scene()->mutable_shadow()->set_light_buffer_size(128);
+  EXPECT_EQ(TechniqueOf(request, true), ShadowTechniqueKind::kLightSweep);
+  request.mutable_scene()->mutable_shadow()->set_technique(v1::SHADOW_TECHNIQUE_HALF_ANGLE);
+  EXPECT_EQ(TechniqueOf(request, true), ShadowTechniqueKind::kHalfAngle);
+}
+
+// Whatever only slices have, or the sweep refuses, asks for slices.
+TEST(ConvertTechnique, IsSlicesWhereTheRequestNeedsThem) {
+  using Change = void (*)(v1::RenderFrameRequest&);
+  const Change changes[] = {
+      [](v1::RenderFrameRequest& r) { r.mutable_scene()->mutable_shadow()->set_slices(64); },
+      [](v1::RenderFrameRequest& r) { r.mutable_scene()->mutable_shadow()->set_interpolate(true); },
+      [](v1::RenderFrameRequest& r) {
+        r.mutable_scene()->mutable_shadow()->set_spacing(v1::SLICE_SPACING_EQUAL_COUNT);
+      },
+      [](v1::RenderFrameRequest& r) {
+        r.mutable_scene()->mutable_shadow()->set_blur_mode(v1::BLUR_MODE_DISTANCE);
+      },
+      [](v1::RenderFrameRequest& r) {
+        r.mutable_scene()->mutable_material()->set_scattering_spread(0.1F);
+      },
+      [](v1::RenderFrameRequest& r) {
+        r.mutable_scene()->mutable_material()->mutable_physical_scattering();
+      },
+      [](v1::RenderFrameRequest& r) { r.add_outputs()->set_kind(v1::OUTPUT_KIND_LIGHT_LAYERS); },
+  };
+  for (const Change& change : changes) {
+    v1::RenderFrameRequest request = MakeRequest();
+    change(request);
+    EXPECT_EQ(TechniqueOf(request, true), ShadowTechniqueKind::kHalfAngle)
+        << request.ShortDebugString();
+  }
+}
+
+TEST(ConvertFrame, LetsASearchReuseNothing) {
+  v1::RenderFrameRequest request = MakeRequest();
+  EXPECT_TRUE(MustConvert(request).request.reuse);
+  request.mutable_target()->set_max_error(0.1);
+  EXPECT_FALSE(MustConvert(request).request.reuse);
+}
+
 TEST(DescribeFrame, TellsSettingsAsUsedAndTheMatricesOfTheWholeImage) {
   v1::RenderFrameRequest request = MakeRequest();
   request.set_request_id("shot 7");

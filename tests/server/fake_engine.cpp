@@ -165,7 +165,7 @@ v1::RenderFrameRequest MakeRequest() {
 
 FrameJob MustConvert(const v1::RenderFrameRequest& request, const ServerLimits& limits) {
   ParticleStore store(1 << 20);
-  return *ConvertRequest(request, store, limits);
+  return *ConvertRequest(request, store, limits, {});
 }
 
 absl::StatusOr<EncodedImage> EncodePlain(const Image& image, ImageKind /*kind*/,

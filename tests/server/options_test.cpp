@@ -40,13 +40,15 @@ TEST(Options, WithoutFlagsAreComplete) {
 TEST(Options, TakeSeveralAddressesAndSizesWithSuffixes) {
   const auto options =
       Parse({"--address", "0.0.0.0:0", "--address", "unix:/tmp/x", "--max-cache-bytes", "3GiB",
-             "--max-particle-bytes", "64MiB", "--max-slices", "77", "--drain-seconds", "5"});
+             "--max-particle-bytes", "64MiB", "--max-slices", "77", "--drain-seconds", "5",
+             "--max-reuse-bytes", "0"});
   ASSERT_TRUE(options.ok() && options->has_value()) << options.status();
   EXPECT_THAT((*options)->addresses, ElementsAre("0.0.0.0:0", "unix:/tmp/x"));
   EXPECT_EQ((*options)->limits.max_cache_bytes, 3 * kGiB);
   EXPECT_EQ((*options)->limits.max_particle_bytes, 64 * kMiB);
   EXPECT_EQ((*options)->limits.max_slices, 77U);
   EXPECT_EQ((*options)->drain_seconds, 5);
+  EXPECT_EQ((*options)->max_reuse_bytes, 0U);
 }
 
 TEST(Options, HelpNamesEveryFlagAndRunsNothing) {
@@ -57,8 +59,9 @@ TEST(Options, HelpNamesEveryFlagAndRunsNothing) {
   for (const char* flag :
        {"--address", "--device", "--log-level", "--encode-threads", "--drain-seconds", "--version",
         "--max-particles", "--max-particle-bytes", "--max-cache-bytes", "--max-image-size",
-        "--max-reference-work", "--max-light-buffer-size", "--max-slices", "--max-lights",
-        "--max-outputs", "--max-output-bytes", "--max-queued-frames", "--max-message-bytes"}) {
+        "--max-reuse-bytes", "--max-reference-work", "--max-light-buffer-size", "--max-slices",
+        "--max-lights", "--max-outputs", "--max-output-bytes", "--max-queued-frames",
+        "--max-message-bytes"}) {
     EXPECT_THAT(out.str(), HasSubstr(flag));
   }
 }
@@ -81,11 +84,11 @@ TEST(Options, ErrorsNameFlagValueAndWhatIsAllowed) {
   EXPECT_THAT(ErrorOf({"stray"}), HasSubstr("stray"));
 }
 
-TEST(LimitsOnDevice, NeverExceedWhatTheDeviceCanHold) {
+TEST(LimitsOnDevice, HoldLightBuffersToTexturesAndImagesToNone) {
   DeviceInfo device;
   device.max_texture_size = 2048;
   const ServerLimits limits = LimitsOnDevice({}, device);
-  EXPECT_EQ(limits.max_image_size, 2048U);
+  EXPECT_EQ(limits.max_image_size, ServerLimits{}.max_image_size);
   EXPECT_EQ(limits.max_light_buffer_size, 2048U);
 }
 

@@ -76,7 +76,7 @@ TEST_P(Validation, RefusesAndNamesFieldAndValue) {
   limits.max_outputs = 3;
   limits.max_output_bytes = 64 * kMiB;
   limits.max_reference_work = 1000;
-  const auto job = ConvertRequest(request, store, limits);
+  const auto job = ConvertRequest(request, store, limits, {});
   ASSERT_FALSE(job.ok());
   EXPECT_EQ(job.status().code(), absl::StatusCode::kInvalidArgument);
   EXPECT_THAT(std::string(job.status().message()), StartsWith(GetParam().message));
@@ -523,17 +523,17 @@ TEST(Validation, PointLightMayStandAmongParticlesWhereNothingIsShadowed) {
   UsePointLight(request, 0.5);
   LightOf(request).set_density(0.0F);
   ParticleStore store(1 << 20);
-  EXPECT_TRUE(ConvertRequest(request, store, ServerLimits{}).ok());
+  EXPECT_TRUE(ConvertRequest(request, store, ServerLimits{}, {}).ok());
   UsePointLight(request, 50.0);
   LightOf(request).set_density(1.0F);
-  EXPECT_TRUE(ConvertRequest(request, store, ServerLimits{}).ok());
+  EXPECT_TRUE(ConvertRequest(request, store, ServerLimits{}, {}).ok());
 }
 
 TEST(Validation, UnknownSetIsNotFoundByItsHexadecimalName) {
   Request request = MakeRequest();
   request.mutable_scene()->set_particle_sha256(std::string(32, '\xab'));
   ParticleStore store(1 << 20);
-  const auto job = ConvertRequest(request, store, ServerLimits{});
+  const auto job = ConvertRequest(request, store, ServerLimits{}, {});
   EXPECT_EQ(job.status().code(), absl::StatusCode::kNotFound);
   EXPECT_THAT(std::string(job.status().message()), ::testing::HasSubstr("abababab"));
 }
@@ -543,7 +543,7 @@ TEST(Validation, TooManyParticlesAreRefusedForGood) {
   ParticleStore store(1 << 20);
   ServerLimits limits;
   limits.max_particles = 1;
-  const auto job = ConvertRequest(request, store, limits);
+  const auto job = ConvertRequest(request, store, limits, {});
   EXPECT_EQ(job.status().code(), absl::StatusCode::kInvalidArgument);
 }
 

@@ -228,9 +228,9 @@ TEST_F(DeviceLightFitTest, IsTheSameInRunsOfAnyLength) {
   const Numbers whole = OnDevice(scene);
   // Cut by places; by texels between groups; by texels within groups, some particles alone too
   // many.
-  for (const RunLimits& limits :
-       {RunLimits{.places = 300}, RunLimits{.places = 77}, RunLimits{.texels = 40'000},
-        RunLimits{.texels = 2'000}, kLongRuns}) {
+  for (const PatchRunLimits& limits :
+       {PatchRunLimits{.places = 300}, PatchRunLimits{.places = 77},
+        PatchRunLimits{.texels = 40'000}, PatchRunLimits{.texels = 2'000}, kLongRuns}) {
     EXPECT_TRUE(OnDevice(scene, {.limits = limits}) == whole)
         << limits.texels << " texels, " << limits.places << " places";
   }
@@ -239,7 +239,7 @@ TEST_F(DeviceLightFitTest, IsTheSameInRunsOfAnyLength) {
 TEST(LightSweepSettings, TakeLongRunsWhereLoopsEndWhenTheyShould) {
   DeviceInfo device;
   device.software = true;
-  EXPECT_EQ(LightSweepSettingsFor(device).limits.places, RunLimits{}.places);
+  EXPECT_EQ(LightSweepSettingsFor(device).limits.places, PatchRunLimits{}.places);
   device.software = false;
   EXPECT_EQ(LightSweepSettingsFor(device).limits.places, kLongRuns.places);
 }

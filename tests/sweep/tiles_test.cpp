@@ -1,4 +1,4 @@
-// Tile lists against a search of every rectangle.
+// Tile lists against a search of every rectangle, and runs against their limits.
 #include <gtest/gtest.h>
 
 #include <random>
@@ -31,8 +31,6 @@ TEST(ListTiles, HasEveryTouchedTileOnceInOrder) {
   const Block<Rect> rects = RandomRects(40000, size);
   const TileLists lists = ListTiles(rects, size, kTile);
   ASSERT_EQ(lists.tiles, glm::ivec2(13, 9));
-  std::vector<uint32_t> parts_of(rects.size(), 0);
-  std::vector<bool> part_seen(lists.entries.size(), false);
   for (int tile = 0; tile < 13 * 9; ++tile) {
     const int x = tile % 13 * kTile;
     const int y = tile / 13 * kTile;
@@ -44,20 +42,35 @@ TEST(ListTiles, HasEveryTouchedTileOnceInOrder) {
         continue;
       }
       ASSERT_LT(entry, lists.begin[static_cast<size_t>(tile) + 1]);
-      ASSERT_EQ(lists.entries[entry].item, i);
-      const uint32_t part = lists.entries[entry].part;
-      EXPECT_GE(part, lists.part_begin[i]);
-      EXPECT_LT(part, lists.part_begin[i + 1]);
-      EXPECT_FALSE(part_seen[part]);
-      part_seen[part] = true;
-      ++parts_of[i];
+      ASSERT_EQ(lists.entries[entry], i);
       ++entry;
     }
     ASSERT_EQ(entry, lists.begin[static_cast<size_t>(tile) + 1]);
   }
-  for (size_t i = 0; i < rects.size(); ++i) {
-    ASSERT_EQ(parts_of[i], lists.part_begin[i + 1] - lists.part_begin[i]);
+}
+
+// Every rectangle once, in order; no run could have been joined by the next one's first.
+TEST(CutIntoRuns, KeepsWithinTheLimitsWithAsFewAsCanBe) {
+  const std::vector<Rect> rects = RandomRects(5000, {101, 67});
+  for (const RunLimits limits : {RunLimits{100, 1000}, RunLimits{5000, 300}, RunLimits{64, 100000},
+                                 RunLimits{5000, 100000}, RunLimits{10, 1}}) {
+    const std::vector<TileRun> runs = CutIntoRuns(rects, 8, limits);
+    size_t next = 0;
+    for (const TileRun& run : runs) {
+      ASSERT_EQ(run.begin, next);
+      ASSERT_GT(run.end, run.begin);
+      next = run.end;
+      size_t entries = 0;
+      for (size_t i = run.begin; i < run.end; ++i) entries += TilesOf(rects[i], 8).count();
+      EXPECT_LE(run.size(), limits.rects);
+      EXPECT_TRUE(run.size() == 1 || entries <= limits.entries);
+      if (run.end == rects.size()) continue;
+      EXPECT_TRUE(run.size() == limits.rects ||
+                  entries + TilesOf(rects[run.end], 8).count() > limits.entries);
+    }
+    EXPECT_EQ(next, rects.size());
   }
+  EXPECT_TRUE(CutIntoRuns({}, 8, {}).empty());
 }
 
 TEST(ListTiles, OfNothingIsEmpty) {

@@ -89,8 +89,11 @@ absl::Status CompositeRuns(const DrawContext& context, const SeenScene& seen, si
 absl::StatusOr<Image> ReadResolved(const DrawContext& context, const gl::Texture& samples) {
   const Sampling& sampling = context.request.scene.sampling;
   if (sampling.supersample == 1 && sampling.downsample == 1) return ReadTexture(samples);
+  const glm::ivec2& window = context.plan.window_size;
+  const glm::ivec2& composite = context.plan.composite_size;
+  const Band whole{{0, 0, window.x, window.y}, {0, 0, composite.x, composite.y}};
   absl::StatusOr<gl::Texture> pixels =
-      ResolveSamples(context.gpu, samples, sampling, context.plan.window_size);
+      ResolveSamples(context.gpu, samples, sampling, whole, composite);
   if (!pixels.ok()) return pixels.status();
   return ReadTexture(*pixels);
 }
@@ -126,11 +129,13 @@ absl::StatusOr<DrawnFrame> DrawOnDevice(const DrawContext& context,
   DrawnImages drawn;
   drawn.transmittance.resize(lights);
   drawn.shadows.resize(lights);
-  std::vector<LightReport> reports(lights);
+  DrawnFrame frame;
+  frame.reports.resize(lights);
 
   // Bring the particles to the device.
   context.clock.BeginGpu("upload");
-  const ParticleBuffers buffers = UploadParticles(context.particles);
+  const auto buffers = ParticlesOnDevice(context.cache, scene, context.particles);
+  if (!buffers.ok()) return buffers.status();
 
   // Sweep every light that casts shadows through them.
   context.clock.BeginGpu("light");
@@ -139,12 +144,12 @@ absl::StatusOr<DrawnFrame> DrawOnDevice(const DrawContext& context,
   for (size_t l = 0; l < lights; ++l) {
     if (!scene.lights[l].casts_shadows()) continue;
     absl::StatusOr<DeviceLightFit> fit = FitLightOnDevice(
-        context.gpu, scene.lights[l], context.particles, buffers, scene.material.profile,
+        context.gpu, scene.lights[l], context.particles, **buffers, scene.material.profile,
         scene.shadow.light_buffer_size, scene.shadow.fit_degree, context.stop);
     if (!fit.ok()) return fit.status();
-    reports[l].casts_shadows = true;
-    reports[l].light_texture_from_world = fit->projection.texture_from_world();
-    reports[l].light_view_from_world = fit->projection.view_from_world;
+    frame.reports[l].casts_shadows = true;
+    frame.reports[l].light_texture_from_world = fit->projection.texture_from_world();
+    frame.reports[l].light_view_from_world = fit->projection.view_from_world;
     if (ShowsLightBuffer(request, l)) drawn.shadows[l].light_buffer = ReadOpticalDepth(*fit);
     fits[l] = *std::move(fit);
     fit_of[l] = &*fits[l];
@@ -157,14 +162,14 @@ absl::StatusOr<DrawnFrame> DrawOnDevice(const DrawContext& context,
   const TargetProjection eye = UploadProjection(
       EyeProjection(scene.camera, context.plan.composite_size, samples), context.particles);
   const absl::StatusOr<DeviceSprites> sprites = ListDeviceSprites(
-      context.gpu, buffers, context.particles.set().origin, eye.projection, NearDepth(scene));
+      context.gpu, **buffers, context.particles.set().origin, eye.projection, NearDepth(scene));
   if (!sprites.ok()) return sprites.status();
   const std::vector<int> shown =
       ShownSlots(request, ListTileLights(scene, /*keep_transmittance=*/true));
   const ShadedLayout layout = LayOutShading(scene, *sprites, scene.shadow.fit_degree,
                                             context.plan.keep_depth, !shown.empty());
   const TileTargets targets = MakeTileTargets(eye.projection.size, layout, shown);
-  absl::Status status = CompositeRuns(context, {buffers, eye, *sprites, fit_of, layout},
+  absl::Status status = CompositeRuns(context, {**buffers, eye, *sprites, fit_of, layout},
                                       settings.most_run_bytes, targets);
   if (!status.ok()) return status;
 
@@ -173,7 +178,8 @@ absl::StatusOr<DrawnFrame> DrawOnDevice(const DrawContext& context,
   if (!status.ok()) return status;
   if (status = gl::CheckErrors("frame"); !status.ok()) return status;
   context.clock.BeginCpu("images");
-  return DrawnFrame{SelectImages(request, drawn), std::move(reports)};
+  frame.images = SelectImages(request, drawn);
+  return frame;
 }
 
 }  // namespace halflight::sweep

@@ -127,7 +127,7 @@ absl::StatusOr<DeviceLightFit> FitLightOnDevice(Gpu& gpu, const Light& light,
   absl::StatusOr<DeviceSprites> sprites =
       ListDeviceSprites(gpu, buffers, particles.set().origin, fit.projection);
   if (!sprites.ok()) return sprites.status();
-  absl::StatusOr<PatchRuns> runs = CutIntoRuns(gpu, *sprites, settings.limits);
+  absl::StatusOr<PatchRuns> runs = CutIntoPatchRuns(gpu, *sprites, settings.limits);
   if (!runs.ok()) return runs.status();
 
   // Make what the passes write.

@@ -14,7 +14,8 @@
 //
 // Memory on the device, at degree d: 48 bytes a particle and 4 more for each of its
 // (d + 1) (d + 2) / 2 coefficients, of which 16 and the coefficients stay; 4 for each texel of a
-// run's rectangles, up to RunLimits::texels; a run's tile lists; 4 a texel of the light buffer.
+// run's rectangles, up to PatchRunLimits::texels; a run's tile lists; 4 a texel of the light
+// buffer.
 #pragma once
 
 #include <stop_token>
@@ -41,7 +42,7 @@ struct DeviceLightFit {
 };
 
 struct LightSweepSettings {
-  RunLimits limits;
+  PatchRunLimits limits;
   int light_tile = 8;  // texels along each side, an invocation each: 8 to 16
 };
 // Runs as the device can walk them.

@@ -36,11 +36,8 @@ DeviceTiles UploadTiles(const TileLists& lists) {
   device.tile_size = lists.tile_size;
   device.begin =
       gl::MakeBuffer("tile begins", std::vector<uint32_t>(lists.begin.begin(), lists.begin.end()));
-  std::vector<uint32_t> places;
-  places.reserve(lists.entries.size());
-  for (const TileEntry& entry : lists.entries) places.push_back(entry.item);
-  device.entries = gl::MakeBuffer("tile entries", places);
-  device.entry_count = places.size();
+  device.entries = gl::MakeBuffer("tile entries", lists.entries);
+  device.entry_count = lists.entries.size();
   return device;
 }
 

@@ -21,7 +21,8 @@ const gl::ProgramSource& PatchOffsetsProgram() {
 }
 
 // Appends places to the last run, or begins another.
-void Append(size_t places, size_t texels, const RunLimits& limits, std::vector<PatchRun>& runs) {
+void Append(size_t places, size_t texels, const PatchRunLimits& limits,
+            std::vector<PatchRun>& runs) {
   if (runs.empty()) runs.push_back({});
   const PatchRun& last = runs.back();
   const size_t end = last.places.end;
@@ -51,10 +52,10 @@ gl::Buffer BindRun(const PatchRun& run, int light_buffer_size) {
   return buffer;
 }
 
-absl::StatusOr<PatchRuns> CutIntoRuns(Gpu& gpu, const DeviceSprites& sprites,
-                                      const RunLimits& wanted) {
-  const RunLimits limits{std::min(wanted.texels, gl::StorageBlockLimit() / sizeof(float)),
-                         wanted.places};
+absl::StatusOr<PatchRuns> CutIntoPatchRuns(Gpu& gpu, const DeviceSprites& sprites,
+                                           const PatchRunLimits& wanted) {
+  const PatchRunLimits limits{std::min(wanted.texels, gl::StorageBlockLimit() / sizeof(float)),
+                              wanted.places};
   const gl::DebugScope scope("patch runs");
   PatchRuns patches;
   if (sprites.count == 0) return patches;

@@ -15,7 +15,7 @@ namespace halflight::sweep {
 
 // Of one run: more texels only where a single particle has them, and no more than a storage block
 // holds.
-struct RunLimits {
+struct PatchRunLimits {
   size_t texels = shader::kMaxPatchTexels;
   // No tile lists more particles than its run has, and a sweep's loop over a tile goes by four:
   // this many stay below the 65,535 iterations after which llvmpipe ends an invocation's loops.
@@ -24,7 +24,8 @@ struct RunLimits {
 
 // For GPUs, whose loops end when they should: every run waits for the device, to list its tiles,
 // and for its longest tile. 256 MiB of patches, one run for a million particles of 64 texels.
-inline constexpr RunLimits kLongRuns = {.texels = size_t{1} << 26U, .places = size_t{1} << 24U};
+inline constexpr PatchRunLimits kLongRuns = {.texels = size_t{1} << 26U,
+                                             .places = size_t{1} << 24U};
 
 struct PatchRun {
   PlaceRun places;
@@ -42,8 +43,8 @@ struct PatchRuns {
 
 // Reads 4 bytes a group back, and of groups that alone exceed a run 4 a place. ResourceExhausted
 // where one particle covers more than shader::kMaxPatchTexels. Needs a current context.
-absl::StatusOr<PatchRuns> CutIntoRuns(Gpu& gpu, const DeviceSprites& sprites,
-                                      const RunLimits& limits);
+absl::StatusOr<PatchRuns> CutIntoPatchRuns(Gpu& gpu, const DeviceSprites& sprites,
+                                           const PatchRunLimits& limits);
 
 // Binds the run's shader::PlaceRunBlock, and returns it.
 gl::Buffer BindRun(const PatchRun& run, int light_buffer_size);

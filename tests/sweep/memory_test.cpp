@@ -1,0 +1,100 @@
+// How much memory a frame of the light sweep takes, a particle: what docs/memory.md says.
+// Counts what the renderer allocates in this process, by replacing operator new.
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cstdlib>
+#include <iostream>
+#include <new>
+
+#include <malloc.h>
+
+#include "renderer/sweep/compositor.h"
+#include "renderer/sweep/light_fit.h"
+#include "tests/renderer/test_scene.h"
+
+namespace {
+
+std::atomic<size_t> held = 0;
+std::atomic<size_t> peak = 0;
+
+void Count(size_t bytes) {
+  const size_t now = held += bytes;
+  size_t before = peak;
+  while (now > before && !peak.compare_exchange_weak(before, now)) {
+  }
+}
+
+}  // namespace
+
+void* operator new(size_t bytes) {
+  void* const memory = std::malloc(bytes);
+  if (memory == nullptr) throw std::bad_alloc();
+  Count(malloc_usable_size(memory));
+  return memory;
+}
+void operator delete(void* memory) noexcept {
+  held -= malloc_usable_size(memory);
+  std::free(memory);
+}
+void operator delete(void* memory, size_t /*bytes*/) noexcept { operator delete(memory); }
+
+namespace halflight::sweep {
+namespace {
+
+// Bytes at most that were held at once while `work` ran, beyond what was held before.
+template <typename Work>
+size_t PeakOf(const Work& work) {
+  const size_t before = held;
+  peak = before;
+  work();
+  return peak - before;
+}
+
+struct Peaks {
+  double light;
+  double eye;
+};
+
+// Of a frame of so many particles, each of which covers a few pixels.
+Peaks PeaksOf(size_t count) {
+  Scene scene = test::BallScene(count, 640);
+  scene.material.radius = 0.01F;
+  const ParticleView particles(scene);
+  LightFit fit;
+  Peaks peaks{};
+  peaks.light = static_cast<double>(PeakOf(
+      [&] { fit = *FitLight(scene.lights[0], particles, scene.material.profile, 256, 4, {}); }));
+  peaks.eye = static_cast<double>(PeakOf([&] {
+    const glm::ivec2 size(640, 640);
+    const Projection eye = EyeProjection(scene.camera, size, 1.0);
+    const SpriteList list = ListSprites(particles, eye, NearDepth(scene));
+    const std::vector<TileLight> lights = ListLights(scene, {&fit}, false);
+    Composite composite = MakeComposite(size, false, 0);
+    for (const TileRun& run : CutIntoRuns(list.rects, kImageTile, {})) {
+      const TileLists tiles =
+          ListTiles(std::span(list.rects).subspan(run.begin, run.size()), size, kImageTile);
+      const Shading shading =
+          ShadeSprites(scene, particles, eye, list, run, lights, fit.degree, false);
+      CompositeRun(list, tiles, shading, eye, scene.material.profile, {}, composite);
+    }
+  }));
+  return peaks;
+}
+
+// What more particles take, once there are several runs of them.
+TEST(Memory, OfAParticleIsWhatTheDocumentationSays) {
+  constexpr size_t kFew = 300'000;
+  constexpr size_t kMany = 600'000;
+  const Peaks few = PeaksOf(kFew);
+  const Peaks many = PeaksOf(kMany);
+  const double light = (many.light - few.light) / (kMany - kFew);
+  const double eye = (many.eye - few.eye) / (kMany - kFew);
+  std::cout << "bytes a particle: light " << light << ", eye " << eye << "; at " << kFew
+            << " particles " << few.light / kFew << ", " << few.eye / kFew << "\n";
+  EXPECT_LT(light, 95.0);
+  EXPECT_LT(eye, 35.0);
+}
+
+}  // namespace
+}  // namespace halflight::sweep
