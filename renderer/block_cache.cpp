@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <bit>
-#include <cstdlib>
 #include <mutex>
 
 namespace halflight {
@@ -38,14 +37,14 @@ size_t RoundedUp(size_t bytes) {
   return (bytes + step - 1) / step * step;
 }
 
+std::align_val_t AlignmentOf(size_t bytes) {
+  return std::align_val_t{bytes >= 2 * kHugePage ? kHugePage : kCacheLine};
+}
+
 void* NewBlock(size_t bytes) {
-  const bool huge = bytes >= 2 * kHugePage;
-  const size_t alignment = huge ? kHugePage : kCacheLine;
-  void* const block =
-      std::aligned_alloc(alignment, (bytes + alignment - 1) / alignment * alignment);
-  if (block == nullptr) throw std::bad_alloc();
+  void* const block = ::operator new(bytes, AlignmentOf(bytes));
   // A hint: where the system has no huge pages, small ones serve.
-  if (huge) madvise(block, bytes, MADV_HUGEPAGE);
+  if (AlignmentOf(bytes) == std::align_val_t{kHugePage}) madvise(block, bytes, MADV_HUGEPAGE);
   return block;
 }
 
@@ -60,7 +59,7 @@ std::vector<Idle> TakeDownTo(size_t limit, Cache& cache) {
 }
 
 void FreeAll(const std::vector<Idle>& blocks) {
-  for (const Idle& idle : blocks) std::free(idle.block);
+  for (const Idle& idle : blocks) ::operator delete(idle.block, AlignmentOf(idle.bytes));
 }
 
 }  // namespace

@@ -151,9 +151,9 @@ HALFLIGHT_CONSTANT(kListGroupSize, 256);
 // Texels in the patches of one run, at most: 64 MiB. Keeps the loops over them below the 65,535
 // iterations after which llvmpipe ends those of an invocation, and sums of 256 below 2^32.
 HALFLIGHT_CONSTANT(kMaxPatchTexels, 0xFFFFFFu);
-HALFLIGHT_CONSTANT(kSweepChunk, 64);    // particles that a light tile loads at once
+HALFLIGHT_CONSTANT(kSweepChunk, 64);  // particles that a light tile loads at once
 HALFLIGHT_CONSTANT(kFitGroupSize, 128);
-HALFLIGHT_CONSTANT(kFitTeamSize, 8);    // invocations that fit a particle of few rows
+HALFLIGHT_CONSTANT(kFitTeamSize, 8);     // invocations that fit a particle of few rows
 HALFLIGHT_CONSTANT(kMaxGramWords, 196);  // vec4: 28 terms squared
 HALFLIGHT_CONSTANT(kMaxLightsInTraversal, 16);
 HALFLIGHT_CONSTANT(kMaxBlurRadius, 63);  // texels to each side

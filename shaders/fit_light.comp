@@ -6,8 +6,8 @@
 //   W = sum of w,  W_j = sum of w m_j,  V_j = sum of w (depth - d) m_j
 //   mean = V_0 / W,  coefficient_i = (d + mean if i = 0) + sum of G_ij (V_j - mean W_j) / W
 // G is the inverse of the monomials' products over the disc (DiscFit of sweep/polynomial.h). d, the
-// depth in the middle of the patch, changes nothing but the rounding: deep in a cloud depth is large
-// and varies little.
+// depth in the middle of the patch, changes nothing but the rounding: deep in a cloud depth is
+// large and varies little.
 //
 // kFitTeamSize invocations share a particle, row by row; the whole workgroup one of many rows.
 #include "bindings.h"

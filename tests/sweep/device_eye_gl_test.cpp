@@ -8,6 +8,7 @@
 #include <limits>
 #include <string>
 
+#include "renderer/block_cache.h"
 #include "renderer/frame_engine.h"
 #include "renderer/frame_images.h"
 #include "renderer/stage_clock.h"
@@ -16,6 +17,7 @@
 #include "renderer/sweep/device/frame.h"
 #include "tests/renderer/device_fixture.h"
 #include "tests/renderer/test_scene.h"
+#include "tests/sweep/fitted_light.h"
 
 namespace halflight::sweep {
 namespace {
@@ -48,17 +50,23 @@ class EyePass {
 
   [[nodiscard]] EyeImages OnCpu() const {
     std::vector<const LightFit*> fits;
-    for (const LightFit& fit : fits_) fits.push_back(fit.sprites.empty() ? nullptr : &fit);
-    const Shading shading =
-        ShadeSprites(scene_, particles_, eye_, list_, fits, scene_.shadow.fit_degree, true, true);
-    auto composite = CompositeTiles(list_, shading, eye_, scene_.material.profile, true, {});
-    EXPECT_TRUE(composite.ok()) << composite.status();
-    EyeImages images{std::move(composite->beauty), std::move(composite->depth), {}};
+    for (const LightFit& fit : fits_) fits.push_back(fit.depth.empty() ? nullptr : &fit);
+    const std::vector<TileLight> lights = ListTileLights(scene_, true);
+    Composite composite = MakeComposite(eye_.size, true, lights.size());
+    for (const TileRun& run : CutIntoRuns(list_.rects, kImageTile, {})) {
+      const TileLists tiles =
+          ListTiles(std::span(list_.rects).subspan(run.begin, run.size()), eye_.size, kImageTile);
+      const Shading shading = ShadeSprites(scene_, particles_, eye_, list_, run, lights, fits,
+                                           scene_.shadow.fit_degree, true);
+      EXPECT_TRUE(
+          CompositeRun(list_, tiles, shading, eye_, scene_.material.profile, {}, composite));
+    }
+    EyeImages images{std::move(composite.beauty), std::move(composite.depth), {}};
     for (size_t l = 0; l < fits_.size(); ++l) {
       images.transmittance.emplace_back();
       if (fits[l] == nullptr) continue;
-      const int slot = TransmittanceSlot(shading.lights, static_cast<int>(l));
-      images.transmittance.back() = composite->transmittance[static_cast<size_t>(slot)];
+      const int slot = TransmittanceSlot(lights, static_cast<int>(l));
+      images.transmittance.back() = composite.transmittance[static_cast<size_t>(slot)];
     }
     return images;
   }
@@ -73,12 +81,12 @@ class EyePass {
       uploaded.push_back({fit.projection,
                           fit.degree,
                           gl::MakeBuffer("fit", fit.depth),
-                          gl::MakeBuffer("sprites", fit.sprites),
+                          gl::MakeBuffer("sprites", SpritesByParticle(particles_, fit.projection)),
                           {}});
     }
     std::vector<const DeviceLightFit*> fits;
     for (size_t l = 0; l < fits_.size(); ++l) {
-      fits.push_back(fits_[l].sprites.empty() ? nullptr : &uploaded[l]);
+      fits.push_back(fits_[l].depth.empty() ? nullptr : &uploaded[l]);
     }
     const ShadedLayout layout =
         LayOutShading(scene_, sprites, scene_.shadow.fit_degree, true, true);
@@ -92,7 +100,7 @@ class EyePass {
       const PlaceRun run{first, std::min(first + most_places, sprites.count)};
       const auto shaded = ShadePlaces(gpu, scene_, buffers, eye, sprites, fits, layout, run);
       EXPECT_TRUE(shaded.ok()) << shaded.status();
-      std::vector<Rect> rects(sprites.count);  // none but the run's
+      Block<Rect> rects(sprites.count);  // none but the run's
       std::copy(list_.rects.begin() + static_cast<ptrdiff_t>(run.first),
                 list_.rects.begin() + static_cast<ptrdiff_t>(run.end),
                 rects.begin() + static_cast<ptrdiff_t>(run.first));
@@ -200,7 +208,8 @@ TEST_F(DeviceEye, DrawsFramesInRuns) {
   device.max_texture_size = 1024;
   device.software = true;
   StageClock clock;
-  const DrawContext context{Device(), device, request, particles, *plan, clock, {}};
+  FrameCache nothing_kept(0);
+  const DrawContext context{Device(), device, nothing_kept, request, particles, *plan, clock, {}};
   const auto at_once = DrawOnDevice(context);
   const auto in_runs = DrawOnDevice(context, {.most_run_bytes = 1});
   ASSERT_TRUE(at_once.ok()) << at_once.status();
@@ -264,16 +273,6 @@ struct EyeCase {
   double tolerance;
 };
 
-class DeviceEyeOf : public DeviceEye, public testing::WithParamInterface<EyeCase> {};
-
-TEST_P(DeviceEyeOf, AgreesWithTheCpu) {
-  Scene scene = CloudScene();
-  GetParam().change(scene);
-  const EyePass pass(scene);
-  const EyeImages device = pass.OnDevice(Device(), kWalk, pass.size());
-  ExpectBelow(DifferenceOf(device, pass.OnCpu()), GetParam().tolerance, GetParam().name);
-}
-
 Light Point(const glm::dvec3& position, bool falloff) {
   Light light;
   light.kind = PointLight{position, falloff};
@@ -283,89 +282,98 @@ Light Point(const glm::dvec3& position, bool falloff) {
 // Pixels are rounded on the plane by up to 2^-25: over a sprite's radius there, times twice its
 // optical depth, that is how far two opacities may be off, and more at the rim of a ball. Particles
 // of a pixel's size and opacity 0.9 are off most.
-INSTANTIATE_TEST_SUITE_P(
-    Scenes, DeviceEyeOf,
-    testing::Values(
-        EyeCase{"NoLights", [](Scene& s) { s.lights.clear(); }, 1e-5},
-        EyeCase{"Balls", [](Scene& s) { s.material.profile = Profile::kBall; }, 1e-5},
-        EyeCase{"ParallelRays", [](Scene& s) { s.camera.projection = Orthographic{2.4}; }, 1e-5},
-        EyeCase{"PointLight",
-                [](Scene& s) {
-                  s.lights = {Point({1.5, 3, 1.2}, false)};
-                },
-                1e-5},
-        EyeCase{"FallingOff",
-                [](Scene& s) {
-                  s.lights = {Point({2, 3.5, 2}, true)};
-                },
-                1e-5},
-        EyeCase{"FallingOffParallelRays",
-                [](Scene& s) {
-                  s.lights = {Point({2, 3.5, 2}, true)};
-                  s.camera.projection = Orthographic{2.4};
-                },
-                1e-5},
-        EyeCase{"ColoredDensity",
-                [](Scene& s) {
-                  s.lights[0].shadow_density = {0.5F, 1.0F, 2.0F};
-                },
-                1e-5},
-        EyeCase{"Phase",
-                [](Scene& s) {
-                  s.material.phase_g = 0.6F;
-                  s.lights.push_back(test::Sun({0.3, -0.4, 1}, 0.0F));
-                },
-                1e-5},
-        EyeCase{"VariedParticles", [](Scene& s) { test::VaryParticles(s, 0.02F, 0.9F); }, 4e-5},
-        EyeCase{"ManyLights",
-                [](Scene& s) {
-                  s.shadow.fit_degree = 6;
-                  s.shadow.light_buffer_size = 64;
-                  s.lights.clear();
-                  for (int l = 0; l < kMaxLights; ++l) {
-                    s.lights.push_back(test::Sun({std::cos(l), -1.0, std::sin(l)}, 0.5F));
-                    s.lights.back().color = glm::vec3(0.1F * static_cast<float>(l), 0.3F, 0.5F);
-                  }
-                  s.lights[3].shadow_density = {0.1F, 1.0F, 3.0F};
-                  s.lights[5] = Point({3, 2, 2}, true);
-                  s.lights[7].shadow_density = glm::vec3(0.0F);
-                  s.material.phase_g = 0.3F;
-                },
-                1e-5},
-        EyeCase{"CameraAmongThem",
-                [](Scene& s) {
-                  s.camera = test::LookAt({0.1, 0.2, 0.4}, {0, 0, -0.2}, 61, 43);
-                  s.camera.projection = Perspective{110 * test::kDegree};
-                  s.material.opacity = 0.1F;
-                },
-                1e-5},
-        EyeCase{"CameraAmongThemUnderAPointLight",
-                [](Scene& s) {
-                  s.camera = test::LookAt({0.1, 0.2, 0.4}, {0, 0, -0.2}, 61, 43);
-                  s.camera.projection = Perspective{110 * test::kDegree};
-                  s.material.opacity = 0.1F;
-                  s.lights = {Point({2, 3.5, 2}, true)};
-                  s.lights[0].shadow_density = {0.5F, 1.0F, 2.0F};
-                },
-                1e-5},
-        EyeCase{"ACutOfALargeImage",
-                [](Scene& s) {
-                  s.camera.width = 6100;
-                  s.camera.height = 4300;
-                  s.camera.window = {3000, 2500, 70, 50};
-                },
-                1e-5},
-        EyeCase{"FarFromTheOrigin",
-                [](Scene& s) {
-                  const glm::dvec3 away(1e7, -2e7, 5e6);
-                  auto set = std::make_shared<ParticleSet>(*s.particles);
-                  set->origin += away;
-                  s.particles = set;
-                  s.camera.view_from_world = glm::translate(s.camera.view_from_world, -away);
-                  s.camera.projection = Orthographic{2.4};
-                },
-                1e-5}),
-    [](const auto& instance) { return instance.param.name; });
+const EyeCase kEyeCases[] = {
+    EyeCase{"NoLights", [](Scene& s) { s.lights.clear(); }, 1e-5},
+    EyeCase{"Balls", [](Scene& s) { s.material.profile = Profile::kBall; }, 1e-5},
+    EyeCase{"ParallelRays", [](Scene& s) { s.camera.projection = Orthographic{2.4}; }, 1e-5},
+    EyeCase{"PointLight",
+            [](Scene& s) {
+              s.lights = {Point({1.5, 3, 1.2}, false)};
+            },
+            1e-5},
+    EyeCase{"FallingOff",
+            [](Scene& s) {
+              s.lights = {Point({2, 3.5, 2}, true)};
+            },
+            1e-5},
+    EyeCase{"FallingOffParallelRays",
+            [](Scene& s) {
+              s.lights = {Point({2, 3.5, 2}, true)};
+              s.camera.projection = Orthographic{2.4};
+            },
+            1e-5},
+    EyeCase{"ColoredDensity",
+            [](Scene& s) {
+              s.lights[0].shadow_density = {0.5F, 1.0F, 2.0F};
+            },
+            1e-5},
+    EyeCase{"Phase",
+            [](Scene& s) {
+              s.material.phase_g = 0.6F;
+              s.lights.push_back(test::Sun({0.3, -0.4, 1}, 0.0F));
+            },
+            1e-5},
+    EyeCase{"VariedParticles", [](Scene& s) { test::VaryParticles(s, 0.02F, 0.9F); }, 4e-5},
+    EyeCase{"ManyLights",
+            [](Scene& s) {
+              s.shadow.fit_degree = 6;
+              s.shadow.light_buffer_size = 64;
+              s.lights.clear();
+              for (int l = 0; l < kMaxLights; ++l) {
+                s.lights.push_back(test::Sun({std::cos(l), -1.0, std::sin(l)}, 0.5F));
+                s.lights.back().color = glm::vec3(0.1F * static_cast<float>(l), 0.3F, 0.5F);
+              }
+              s.lights[3].shadow_density = {0.1F, 1.0F, 3.0F};
+              s.lights[5] = Point({3, 2, 2}, true);
+              s.lights[7].shadow_density = glm::vec3(0.0F);
+              s.material.phase_g = 0.3F;
+            },
+            1e-5},
+    EyeCase{"CameraAmongThem",
+            [](Scene& s) {
+              s.camera = test::LookAt({0.1, 0.2, 0.4}, {0, 0, -0.2}, 61, 43);
+              s.camera.projection = Perspective{110 * test::kDegree};
+              s.material.opacity = 0.1F;
+            },
+            1e-5},
+    EyeCase{"CameraAmongThemUnderAPointLight",
+            [](Scene& s) {
+              s.camera = test::LookAt({0.1, 0.2, 0.4}, {0, 0, -0.2}, 61, 43);
+              s.camera.projection = Perspective{110 * test::kDegree};
+              s.material.opacity = 0.1F;
+              s.lights = {Point({2, 3.5, 2}, true)};
+              s.lights[0].shadow_density = {0.5F, 1.0F, 2.0F};
+            },
+            1e-5},
+    EyeCase{"ACutOfALargeImage",
+            [](Scene& s) {
+              s.camera.width = 6100;
+              s.camera.height = 4300;
+              s.camera.window = {3000, 2500, 70, 50};
+            },
+            1e-5},
+    EyeCase{"FarFromTheOrigin",
+            [](Scene& s) {
+              const glm::dvec3 away(1e7, -2e7, 5e6);
+              auto set = std::make_shared<ParticleSet>(*s.particles);
+              set->origin += away;
+              s.particles = set;
+              s.camera.view_from_world = glm::translate(s.camera.view_from_world, -away);
+              s.camera.projection = Orthographic{2.4};
+            },
+            1e-5},
+};
+
+// One test for all: each process compiles its shaders anew.
+TEST_F(DeviceEye, AgreesWithTheCpu) {
+  for (const EyeCase& tested : kEyeCases) {
+    Scene scene = CloudScene();
+    tested.change(scene);
+    const EyePass pass(scene);
+    const EyeImages device = pass.OnDevice(Device(), kWalk, pass.size());
+    ExpectBelow(DifferenceOf(device, pass.OnCpu()), tested.tolerance, tested.name);
+  }
+}
 
 }  // namespace
 }  // namespace halflight::sweep

@@ -1,79 +1,21 @@
-// The light sweep on the device against that on the CPU, and against itself in other runs and
-// tiles.
+// The light sweep on the device against that on the CPU and in float64, and against itself in other
+// runs and tiles.
 #include "renderer/sweep/device/light_fit.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstring>
 #include <iostream>
 #include <string>
 
-#include "renderer/sweep/light_fit.h"
-#include "renderer/sweep/polynomial.h"
 #include "tests/oracle/plume.h"
 #include "tests/renderer/device_fixture.h"
 #include "tests/renderer/test_scene.h"
+#include "tests/sweep/fitted_light.h"
 
 namespace halflight::sweep {
 namespace {
-
-// A fit as plain numbers.
-struct Numbers {
-  std::vector<float> depth;
-  std::vector<Sprite> sprites;
-  std::vector<float> behind;  // all particles
-
-  bool operator==(const Numbers& other) const {
-    return depth == other.depth && behind == other.behind &&
-           std::memcmp(sprites.data(), other.sprites.data(), sprites.size() * sizeof(Sprite)) == 0;
-  }
-};
-
-// Over the disc of each sprite and over the light buffer, in units of the largest optical depth.
-struct Difference {
-  double rms = 0.0;
-  double largest = 0.0;
-  double behind = 0.0;
-};
-
-double ValueAt(int degree, const float* p, double x, double y) {
-  double value = 0.0;
-  for (int a = 0; a <= degree; ++a) {
-    for (int b = 0; a + b <= degree; ++b) {
-      value += p[TermIndex(degree, a, b)] * std::pow(x, a) * std::pow(y, b);
-    }
-  }
-  return value;
-}
-
-Difference Between(const Numbers& a, const Numbers& b, int degree) {
-  const double scale = *std::max_element(b.behind.begin(), b.behind.end());
-  Difference difference;
-  for (size_t i = 0; i < b.behind.size(); ++i) {
-    difference.behind =
-        std::max(difference.behind, std::abs(double{a.behind[i]} - b.behind[i]) / scale);
-  }
-  const auto terms = static_cast<size_t>(Terms(degree));
-  std::vector<float> p(terms);
-  size_t count = 0;
-  for (size_t first = 0; first < b.depth.size(); first += terms) {
-    for (size_t i = 0; i < terms; ++i) p[i] = a.depth[first + i] - b.depth[first + i];
-    for (int place = 0; place < 49; ++place) {
-      const double x = place % 7 / 3.0 - 1.0;
-      const double y = place / 7 / 3.0 - 1.0;
-      if (x * x + y * y > 1.0) continue;
-      const double error = ValueAt(degree, p.data(), x, y) / scale;
-      difference.rms += error * error;
-      difference.largest = std::max(difference.largest, std::abs(error));
-      ++count;
-    }
-  }
-  difference.rms = std::sqrt(difference.rms / static_cast<double>(std::max<size_t>(count, 1)));
-  return difference;
-}
 
 class DeviceLightFitTest : public test::DeviceTest {
  protected:
@@ -87,7 +29,7 @@ class DeviceLightFitTest : public test::DeviceTest {
   }
 
   // Fails the test where the fit fails.
-  static Numbers OnDevice(const Scene& scene, const LightSweepSettings& settings = {}) {
+  static FittedLight OnDevice(const Scene& scene, const LightSweepSettings& settings = {}) {
     const absl::StatusOr<DeviceLightFit> fit = FitOnDevice(scene, settings);
     EXPECT_TRUE(fit.ok()) << fit.status();
     if (!fit.ok()) return {};
@@ -97,17 +39,10 @@ class DeviceLightFitTest : public test::DeviceTest {
             test::ReadBuffer<Sprite>(fit->sprites, count), ReadOpticalDepth(*fit).pixels};
   }
 
-  static Numbers OnCpu(const Scene& scene) {
-    const absl::StatusOr<LightFit> fit =
-        FitLight(scene.lights[0], ParticleView(scene), scene.material.profile,
-                 scene.shadow.light_buffer_size, scene.shadow.fit_degree, {});
-    return {fit->depth, fit->sprites, fit->optical_depth.pixels};
-  }
-
-  static Difference Compare(const std::string& name, const Scene& scene,
-                            const LightSweepSettings& settings = {}) {
-    const Difference difference =
-        Between(OnDevice(scene, settings), OnCpu(scene), scene.shadow.fit_degree);
+  static FitDifference Compare(const std::string& name, const Scene& scene,
+                               const LightSweepSettings& settings = {}) {
+    const FitDifference difference =
+        Between(OnDevice(scene, settings), FitOnCpu(scene), scene.shadow.fit_degree);
     std::cout << name << ": rms " << difference.rms << ", largest " << difference.largest
               << ", behind " << difference.behind << "\n";
     return difference;
@@ -135,10 +70,11 @@ struct FitCase {
 // Both round: where a texel lies against a sprite to some 1e-5 of the smallest sprites' radius,
 // which tells most at the steep rim of a ball, and sums to their last digits. A fit of degree 6
 // makes 20 times as much of it. Both are about as far from float64.
-void ExpectRounding(const Difference& difference) {
+void ExpectRounding(const FitDifference& difference) {
   EXPECT_LT(difference.rms, 5e-6);
   EXPECT_LT(difference.largest, 1e-3);
   EXPECT_LT(difference.behind, 1e-4);
+  EXPECT_LT(difference.sprites, 1e-6);
 }
 
 class DeviceLightFitOf : public DeviceLightFitTest, public testing::WithParamInterface<FitCase> {};
@@ -212,6 +148,23 @@ INSTANTIATE_TEST_SUITE_P(
                             }}),
     [](const auto& instance) { return std::string(instance.param.name); });
 
+TEST_F(DeviceLightFitTest, IsAsNearFloat64AsTheCpus) {
+  for (const Profile profile : {Profile::kSoft, Profile::kBall}) {
+    for (const float radius : {0.03F, 0.4F}) {
+      Scene scene = test::BallScene(1000);
+      scene.material.profile = profile;
+      scene.material.radius = radius;
+      scene.material.opacity = 0.9F;
+      const FittedLight exact = FitInFloat64(scene);
+      const FitDifference device = Between(OnDevice(scene), exact, scene.shadow.fit_degree);
+      const FitDifference cpu = Between(FitOnCpu(scene), exact, scene.shadow.fit_degree);
+      std::cout << "radius " << radius << ": device " << device.rms << ", CPU " << cpu.rms << "\n";
+      EXPECT_LT(device.rms, 2.0 * cpu.rms) << radius;
+      EXPECT_LT(device.behind, 3.0 * cpu.behind) << radius;
+    }
+  }
+}
+
 // All in one tile, more than llvmpipe's loops could walk one by one.
 TEST_F(DeviceLightFitTest, IsTheCpusWhereTileListsAreLong) {
   Scene scene = test::BallScene(100'000);
@@ -225,7 +178,7 @@ TEST_F(DeviceLightFitTest, IsTheCpusWhereTileListsAreLong) {
 TEST_F(DeviceLightFitTest, IsTheSameInRunsOfAnyLength) {
   Scene scene = VariedBall(1500);
   SetRadii(scene, [](size_t i) { return i % 300 == 7 ? 1.5F : 0.05F; });
-  const Numbers whole = OnDevice(scene);
+  const FittedLight whole = OnDevice(scene);
   // Cut by places; by texels between groups; by texels within groups, some particles alone too
   // many.
   for (const PatchRunLimits& limits :
@@ -257,7 +210,7 @@ TEST_F(DeviceLightFitTest, IsTheSameAgain) {
 
 TEST_F(DeviceLightFitTest, OfNoParticlesIsEmpty) {
   Scene scene = test::BallScene(0);
-  const Numbers none = OnDevice(scene);
+  const FittedLight none = OnDevice(scene);
   EXPECT_TRUE(none.depth.empty());
   const auto texels = static_cast<size_t>(scene.shadow.light_buffer_size);
   EXPECT_EQ(none.behind, std::vector<float>(texels * texels, 0.0F));
@@ -270,11 +223,17 @@ TEST_F(DeviceLightFitTest, EndsWhenItIsStopped) {
   EXPECT_EQ(fit.status().code(), absl::StatusCode::kCancelled) << fit.status();
 }
 
+// One particle all over the light buffer: its patch is too large, or the light buffer itself.
 TEST_F(DeviceLightFitTest, RefusesWhatItsBuffersCannotHold) {
   Scene scene = test::BallScene(1);
-  scene.shadow.light_buffer_size = 8192;
-  const auto fit = FitOnDevice(scene);
-  EXPECT_EQ(fit.status().code(), absl::StatusCode::kResourceExhausted) << fit.status();
+  for (const int size : {5000, 8192}) {
+    scene.shadow.light_buffer_size = size;
+    for (const PatchRunLimits& limits : {PatchRunLimits{}, kLongRuns}) {
+      const auto fit = FitOnDevice(scene, {.limits = limits});
+      EXPECT_EQ(fit.status().code(), absl::StatusCode::kResourceExhausted) << fit.status();
+      EXPECT_THAT(fit.status().message(), testing::HasSubstr("allowed on this device")) << size;
+    }
+  }
 }
 
 }  // namespace

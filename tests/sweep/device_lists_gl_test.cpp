@@ -1,4 +1,5 @@
 // Lists made on the device against those of the CPU, and against the particles themselves.
+#include "renderer/block_cache.h"
 #include "renderer/sweep/device/lists.h"
 
 #include <gtest/gtest.h>
@@ -17,7 +18,7 @@ namespace {
 constexpr glm::ivec2 kSize(101, 67);
 
 template <typename T>
-bool SameBytes(const std::vector<T>& a, const std::vector<T>& b) {
+bool SameBytes(const std::vector<T>& a, const Block<T>& b) {
   return a.size() == b.size() &&
          (a.empty() || std::memcmp(a.data(), b.data(), a.size() * sizeof(T)) == 0);
 }
@@ -223,7 +224,8 @@ TEST_P(ListDeviceSpritesOf, HasTheTilesOfTheCpu) {
   const Cloud cloud = GetParam().make();
   const absl::StatusOr<DeviceSprites> sprites = List(cloud);
   ASSERT_TRUE(sprites.ok()) << sprites.status();
-  const auto rects = test::ReadBuffer<Rect>(sprites->rects, sprites->count);
+  const auto read = test::ReadBuffer<Rect>(sprites->rects, sprites->count);
+  const Block<Rect> rects(read.begin(), read.end());
   for (const int tile_size : {8, 64, 128}) {
     const TileLists expected = ListTiles(rects, cloud.target.size, tile_size);
     const DeviceTiles uploaded = UploadTiles(expected);
@@ -270,7 +272,7 @@ TEST_F(DeviceListsTest, OfRunsTogetherAreTheTilesOfAll) {
   for (size_t tile = 0; tile < tiles; ++tile) {
     ASSERT_EQ(entries[tile].size(), expected.begin[tile + 1] - expected.begin[tile]);
     for (size_t e = 0; e < entries[tile].size(); ++e) {
-      ASSERT_EQ(entries[tile][e], expected.entries[expected.begin[tile] + e].item);
+      ASSERT_EQ(entries[tile][e], expected.entries[expected.begin[tile] + e]);
     }
   }
 }

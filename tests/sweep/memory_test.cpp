@@ -33,11 +33,21 @@ void* operator new(size_t bytes) {
   Count(malloc_usable_size(memory));
   return memory;
 }
+void* operator new(size_t bytes, std::align_val_t alignment) {
+  const auto align = static_cast<size_t>(alignment);
+  void* const memory = std::aligned_alloc(align, (bytes + align - 1) / align * align);
+  if (memory == nullptr) throw std::bad_alloc();
+  Count(malloc_usable_size(memory));
+  return memory;
+}
 void operator delete(void* memory) noexcept {
   held -= malloc_usable_size(memory);
   std::free(memory);
 }
 void operator delete(void* memory, size_t /*bytes*/) noexcept { operator delete(memory); }
+void operator delete(void* memory, std::align_val_t /*alignment*/) noexcept {
+  operator delete(memory);
+}
 
 namespace halflight::sweep {
 namespace {
@@ -69,13 +79,13 @@ Peaks PeaksOf(size_t count) {
     const glm::ivec2 size(640, 640);
     const Projection eye = EyeProjection(scene.camera, size, 1.0);
     const SpriteList list = ListSprites(particles, eye, NearDepth(scene));
-    const std::vector<TileLight> lights = ListLights(scene, {&fit}, false);
+    const std::vector<TileLight> lights = ListTileLights(scene, false);
     Composite composite = MakeComposite(size, false, 0);
     for (const TileRun& run : CutIntoRuns(list.rects, kImageTile, {})) {
       const TileLists tiles =
           ListTiles(std::span(list.rects).subspan(run.begin, run.size()), size, kImageTile);
       const Shading shading =
-          ShadeSprites(scene, particles, eye, list, run, lights, fit.degree, false);
+          ShadeSprites(scene, particles, eye, list, run, lights, {&fit}, fit.degree, false);
       CompositeRun(list, tiles, shading, eye, scene.material.profile, {}, composite);
     }
   }));
@@ -84,6 +94,7 @@ Peaks PeaksOf(size_t count) {
 
 // What more particles take, once there are several runs of them.
 TEST(Memory, OfAParticleIsWhatTheDocumentationSays) {
+  BlockCache::SetLimit(0);  // what is idle is no frame's
   constexpr size_t kFew = 300'000;
   constexpr size_t kMany = 600'000;
   const Peaks few = PeaksOf(kFew);
@@ -92,7 +103,7 @@ TEST(Memory, OfAParticleIsWhatTheDocumentationSays) {
   const double eye = (many.eye - few.eye) / (kMany - kFew);
   std::cout << "bytes a particle: light " << light << ", eye " << eye << "; at " << kFew
             << " particles " << few.light / kFew << ", " << few.eye / kFew << "\n";
-  EXPECT_LT(light, 95.0);
+  EXPECT_LT(light, 88.0 * 9 / 8 + 6.0);  // an array takes up to an eighth more
   EXPECT_LT(eye, 35.0);
 }
 

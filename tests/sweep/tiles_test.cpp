@@ -51,7 +51,7 @@ TEST(ListTiles, HasEveryTouchedTileOnceInOrder) {
 
 // Every rectangle once, in order; no run could have been joined by the next one's first.
 TEST(CutIntoRuns, KeepsWithinTheLimitsWithAsFewAsCanBe) {
-  const std::vector<Rect> rects = RandomRects(5000, {101, 67});
+  const Block<Rect> rects = RandomRects(5000, {101, 67});
   for (const RunLimits limits : {RunLimits{100, 1000}, RunLimits{5000, 300}, RunLimits{64, 100000},
                                  RunLimits{5000, 100000}, RunLimits{10, 1}}) {
     const std::vector<TileRun> runs = CutIntoRuns(rects, 8, limits);

@@ -145,7 +145,8 @@ absl::StatusOr<DrawnFrame> DrawOnDevice(const DrawContext& context,
     if (!scene.lights[l].casts_shadows()) continue;
     absl::StatusOr<DeviceLightFit> fit = FitLightOnDevice(
         context.gpu, scene.lights[l], context.particles, **buffers, scene.material.profile,
-        scene.shadow.light_buffer_size, scene.shadow.fit_degree, context.stop);
+        scene.shadow.light_buffer_size, scene.shadow.fit_degree, context.stop,
+        LightSweepSettingsFor(context.device));
     if (!fit.ok()) return fit.status();
     frame.reports[l].casts_shadows = true;
     frame.reports[l].light_texture_from_world = fit->projection.texture_from_world();

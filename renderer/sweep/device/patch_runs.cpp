@@ -74,7 +74,9 @@ absl::StatusOr<PatchRuns> CutIntoPatchRuns(Gpu& gpu, const DeviceSprites& sprite
   gl::DispatchGroups(groups);
   glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);
 
-  // Cut between groups, or within those that are too large.
+  // Cut between groups, or within those that are too large: only below kMaxPatchTexels do they tell
+  // what every particle has.
+  const size_t most_of_group = std::min<size_t>(limits.texels, shader::kMaxPatchTexels);
   std::vector<uint32_t> group_offsets;
   group_offsets.reserve(groups);
   uint32_t before = 0;
@@ -82,7 +84,7 @@ absl::StatusOr<PatchRuns> CutIntoPatchRuns(Gpu& gpu, const DeviceSprites& sprite
   for (size_t group = 0; group < groups; ++group) {
     const size_t first = group * kGroup;
     const size_t places = std::min(kGroup, sprites.count - first);
-    if (group_texels[group] <= limits.texels && places <= limits.places) {
+    if (group_texels[group] <= most_of_group && places <= limits.places) {
       Append(places, group_texels[group], limits, patches.runs);
     } else {
       std::vector<uint32_t> offsets = Read(patches.offsets, first, places);
