@@ -42,7 +42,8 @@ vec2 VisibleSlopes(float x, float w, float r) {
 }
 
 void main() {
-  uint place = gl_GlobalInvocationID.x;
+  uint group = gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
+  uint place = group * kProjectGroupSize + gl_LocalInvocationID.x;
   if (place >= particles.count.x) return;
   uint i = order[place].index;
   float radius = kHasRadii ? radii[i] : particles.uniforms.x;

@@ -44,7 +44,10 @@ absl::StatusOr<gl::Buffer> ProjectParticles(Gpu& gpu, const ParticleBuffers& par
   glBindBufferBase(GL_SHADER_STORAGE_BUFFER, shader::kSplatsBinding, splats.name());
   const auto groups = static_cast<GLuint>((particles.count + shader::kProjectGroupSize - 1) /
                                           shader::kProjectGroupSize);
-  glDispatchCompute(groups, 1, 1);
+  // GL guarantees so many groups along an axis; the shader counts rows of them.
+  constexpr GLuint kMostAcross = 65535;
+  const GLuint rows = (groups + kMostAcross - 1) / kMostAcross;
+  glDispatchCompute((groups + rows - 1) / rows, rows, 1);
   glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
   return splats;
 }

@@ -109,6 +109,35 @@ absl::StatusOr<std::shared_ptr<const sweep::LightFit>> FitOf(const DrawContext& 
   return fit;
 }
 
+// What the eye sees, from an earlier frame or listed now.
+absl::StatusOr<std::shared_ptr<const sweep::SpriteList>> SpritesOf(const DrawContext& context,
+                                                                   const SpriteListKey& key,
+                                                                   DrawnFrame& frame) {
+  bool made = false;
+  auto list = context.cache.FindOrMake(
+      context.request.scene.particles, key, [&]() -> absl::StatusOr<sweep::SpriteList> {
+        made = true;
+        return sweep::ListSprites(context.particles, key.eye, key.near_depth);
+      });
+  if (!made) frame.reused.push_back(EyeSort());
+  return list;
+}
+
+// The tiles of one of the list's runs.
+absl::StatusOr<std::shared_ptr<const sweep::TileLists>> TilesOf(const DrawContext& context,
+                                                                const SpriteListKey& key,
+                                                                const sweep::SpriteList& list,
+                                                                const sweep::TileRun& run) {
+  FrameCache nothing_kept(0);
+  FrameCache& cache = run.size() == list.rects.size() ? context.cache : nothing_kept;
+  return cache.FindOrMake(context.request.scene.particles, TileListsKey{key},
+                          [&]() -> absl::StatusOr<sweep::TileLists> {
+                            const std::span<const sweep::Rect> rects(list.rects);
+                            return sweep::ListTiles(rects.subspan(run.begin, run.size()),
+                                                    key.eye.size, sweep::kImageTile);
+                          });
+}
+
 }  // namespace
 
 absl::Status LightSweep::Check(const FrameRequest& request) const {
@@ -177,12 +206,7 @@ absl::StatusOr<DrawnFrame> DrawOnCpu(const DrawContext& context) {
                          static_cast<double>(scene.sampling.downsample);
   const Projection eye = EyeProjection(scene.camera, plan.composite_size, samples);
   const SpriteListKey list_key{ParticleViewKeyOf(scene), eye, sweep::NearDepth(scene)};
-  frame.reused.push_back(EyeSort());
-  const auto list = context.cache.FindOrMake(
-      scene.particles, list_key, [&]() -> absl::StatusOr<sweep::SpriteList> {
-        frame.reused.pop_back();
-        return sweep::ListSprites(particles, eye, list_key.near_depth);
-      });
+  const auto list = SpritesOf(context, list_key, frame);
   if (!list.ok()) return list.status();
 
   // Run by run, shade them and draw them behind those that are nearer.
@@ -191,17 +215,9 @@ absl::StatusOr<DrawnFrame> DrawOnCpu(const DrawContext& context) {
       sweep::ListTileLights(scene, keep_transmittance);
   sweep::Composite composite = sweep::MakeComposite(plan.composite_size, plan.keep_depth,
                                                     keep_transmittance ? tile_lights.size() : 0);
-  const std::vector<sweep::TileRun> runs =
-      sweep::CutIntoRuns((*list)->rects, sweep::kImageTile, {});
-  FrameCache nothing_kept(0);
-  FrameCache& cache_of_tiles = runs.size() == 1 ? context.cache : nothing_kept;
-  for (const sweep::TileRun& run : runs) {
+  for (const sweep::TileRun& run : sweep::CutIntoRuns((*list)->rects, sweep::kImageTile, {})) {
     clock.BeginCpu("project");
-    const auto tiles = cache_of_tiles.FindOrMake(
-        scene.particles, TileListsKey{list_key}, [&]() -> absl::StatusOr<sweep::TileLists> {
-          return sweep::ListTiles(std::span((*list)->rects).subspan(run.begin, run.size()),
-                                  eye.size, sweep::kImageTile);
-        });
+    const auto tiles = TilesOf(context, list_key, **list, run);
     if (!tiles.ok()) return tiles.status();
     clock.BeginCpu("shade");
     const sweep::Shading shading =

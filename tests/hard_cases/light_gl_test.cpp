@@ -44,7 +44,8 @@ TEST_F(Lighting, FromAPointInsideIsRefusedOrExact) {
   const Scene scene = LampLitBall({0.1, 0.2, 0.1});
   const absl::Status status = Renderer().Render(test::Beauty(scene), {}).status();
   EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument);
-  EXPECT_NE(status.message().find("lights[0].point.position: (0.1, 0.2, 0.1), allowed: outside"),
+  EXPECT_NE(status.message().find("lights[0].point.position: (0.1, 0.2, 0.1), allowed under "
+                                  "technique HALF_ANGLE: outside"),
             std::string::npos)
       << status;
   HoldReference("point light inside the cloud", scene, 1e-7);

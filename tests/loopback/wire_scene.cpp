@@ -18,6 +18,18 @@ std::vector<float> Flat(const std::vector<glm::vec3>& vectors) {
   return floats;
 }
 
+v1::ShadowTechnique TechniqueOf(ShadowTechniqueKind kind) {
+  switch (kind) {
+    case ShadowTechniqueKind::kReference:
+      return v1::SHADOW_TECHNIQUE_REFERENCE;
+    case ShadowTechniqueKind::kLightSweep:
+      return v1::SHADOW_TECHNIQUE_LIGHT_SWEEP;
+    case ShadowTechniqueKind::kHalfAngle:
+      break;
+  }
+  return v1::SHADOW_TECHNIQUE_HALF_ANGLE;
+}
+
 void Set(const glm::dvec3& from, v1::Vector3& to) {
   to.set_x(from.x);
   to.set_y(from.y);
@@ -115,6 +127,7 @@ v1::RenderFrameRequest RequestWithoutParticles(const Scene& scene) {
   }
   Set(scene.material, *message.mutable_material());
   v1::Shadow& shadow = *message.mutable_shadow();
+  shadow.set_technique(TechniqueOf(scene.shadow.technique));
   shadow.set_slices(scene.shadow.slices);
   shadow.set_interpolate(scene.shadow.interpolate);
   shadow.set_spacing(scene.shadow.spacing == SliceSpacing::kEqualCount

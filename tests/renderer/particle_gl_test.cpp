@@ -165,11 +165,11 @@ TEST_F(Particles, OfOpacityOneAreClampedAndCounted) {
   for (const float value : frame.images[0].pixels) ASSERT_TRUE(std::isfinite(value));
 }
 
-// What the device is told of so many particles is larger than the smallest storage block that GL
-// guarantees (2^27 bytes): the last of them, farthest away, are drawn like the first.
+// More than fit in the storage block (2^27 bytes) and in the row of groups (65,535) that GL
+// guarantees: the last of them, farthest away, is drawn like the first.
 TEST_F(ManyParticles, AreDrawnToTheLast) {
-  constexpr size_t kCount = (size_t{1} << 27U) / 48 + 1000;  // 48: sizeof(shader::Splat)
-  static_assert(sizeof(shader::Splat) == 48);
+  constexpr size_t kCount = size_t{65536} * shader::kProjectGroupSize + 1000;
+  static_assert(kCount * sizeof(shader::Splat) > size_t{1} << 27U);
   auto set = std::make_shared<ParticleSet>();
   set->positions.assign(kCount, glm::vec3(100.0F, 0.0F, 0.0F));  // beside the image
   set->positions.back() = {0.0F, 0.0F, -200.0F};
