@@ -282,7 +282,7 @@ Light Point(const glm::dvec3& position, bool falloff) {
 // Pixels are rounded on the plane by up to 2^-25: over a sprite's radius there, times twice its
 // optical depth, that is how far two opacities may be off, and more at the rim of a ball. Particles
 // of a pixel's size and opacity 0.9 are off most.
-const EyeCase kEyeCases[] = {
+constexpr EyeCase kEyeCases[] = {
     EyeCase{"NoLights", [](Scene& s) { s.lights.clear(); }, 1e-5},
     EyeCase{"Balls", [](Scene& s) { s.material.profile = Profile::kBall; }, 1e-5},
     EyeCase{"ParallelRays", [](Scene& s) { s.camera.projection = Orthographic{2.4}; }, 1e-5},
