@@ -6,10 +6,17 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 #include "absl/strings/str_join.h"
-#include "tests/report/markdown.h"
+#include "tests/measure/markdown.h"
 
 namespace halflight::report {
 namespace {
+
+using measure::kExact;
+using measure::Number;
+using measure::Percent;
+using measure::Row;
+using measure::Rule;
+using measure::Times;
 
 class Writer {
  public:

@@ -3,7 +3,7 @@
 
 #include <string>
 
-namespace halflight::report {
+namespace halflight::measure {
 
 // As the system names it; "unknown CPU" where it does not.
 std::string CpuModel();
@@ -11,4 +11,4 @@ std::string CpuModel();
 // Year, month and day, UTC.
 std::string Today();
 
-}  // namespace halflight::report
+}  // namespace halflight::measure

@@ -1,9 +1,9 @@
-#include "tests/report/machine.h"
+#include "tests/measure/machine.h"
 
 #include <ctime>
 #include <fstream>
 
-namespace halflight::report {
+namespace halflight::measure {
 
 std::string CpuModel() {
   std::ifstream file("/proc/cpuinfo");
@@ -25,4 +25,4 @@ std::string Today() {
   return text;
 }
 
-}  // namespace halflight::report
+}  // namespace halflight::measure

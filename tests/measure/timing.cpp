@@ -1,0 +1,87 @@
+#include "tests/measure/timing.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <memory>
+
+namespace halflight::measure {
+
+double Quantile(std::vector<double> values, double part) {
+  std::sort(values.begin(), values.end());
+  const double place = part * static_cast<double>(values.size() - 1);
+  const auto below = static_cast<size_t>(place);
+  const size_t above = std::min(below + 1, values.size() - 1);
+  return std::lerp(values[below], values[above], place - static_cast<double>(below));
+}
+
+double Median(std::vector<double> values) { return Quantile(std::move(values), 0.5); }
+
+Draw DrawWith(FrameRenderer& renderer) {
+  return [&renderer](const FrameRequest& request) { return renderer.Render(request, {}); };
+}
+
+FrameRequest FirstSeen(const Scene& scene) {
+  FrameRequest request{scene, {{ImageKind::kBeauty}}};
+  request.scene.particles = std::make_shared<const ParticleSet>(*scene.particles);
+  return request;
+}
+
+absl::Status TimeFrame(const Draw& draw, const FrameRequest& request, TimedFrame& frame) {
+  const auto begin = std::chrono::steady_clock::now();
+  absl::StatusOr<FrameResult> result = draw(request);
+  const auto end = std::chrono::steady_clock::now();
+  if (!result.ok()) return result.status();
+  if (frame.beauty.pixels.empty()) frame.beauty = std::move(result->images.at(0));
+  frame.milliseconds.push_back(std::chrono::duration<double, std::milli>(end - begin).count());
+  frame.stages.push_back(std::move(result->timings));
+  return absl::OkStatus();
+}
+
+absl::StatusOr<std::vector<TimedFrame>> TimeInTurns(std::span<const Entrant> entrants,
+                                                    int repeats) {
+  std::vector<TimedFrame> frames(entrants.size());
+  for (int turn = 0; turn <= repeats; ++turn) {
+    for (size_t i = 0; i < entrants.size(); ++i) {
+      const FrameRequest request = FirstSeen(entrants[i].scene);
+      if (absl::Status status = TimeFrame(entrants[i].draw, request, frames[i]); !status.ok()) {
+        return status;
+      }
+      if (turn == 0) {
+        frames[i].milliseconds.clear();
+        frames[i].stages.clear();
+      }
+    }
+  }
+  return frames;
+}
+
+std::vector<StageTiming> MedianStages(const TimedFrame& frame) {
+  std::vector<StageTiming> medians;
+  if (frame.stages.empty()) return medians;
+  for (StageTiming stage : frame.stages.front()) {
+    std::vector<double> values;
+    for (const std::vector<StageTiming>& repeat : frame.stages) {
+      for (const StageTiming& timing : repeat) {
+        if (timing.stage == stage.stage) values.push_back(timing.milliseconds);
+      }
+    }
+    stage.milliseconds = Median(std::move(values));
+    medians.push_back(std::move(stage));
+  }
+  return medians;
+}
+
+std::vector<double> TimeRatios(const TimedFrame& frame, const TimedFrame& baseline) {
+  std::vector<double> ratios;
+  for (size_t turn = 0; turn < frame.milliseconds.size(); ++turn) {
+    ratios.push_back(frame.milliseconds[turn] / baseline.milliseconds[turn]);
+  }
+  return ratios;
+}
+
+double TimeRatio(const TimedFrame& frame, const TimedFrame& baseline) {
+  return Median(TimeRatios(frame, baseline));
+}
+
+}  // namespace halflight::measure
