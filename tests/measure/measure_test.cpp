@@ -37,17 +37,14 @@ TEST(Quantile, LiesBetweenTheValuesInProportion) {
   EXPECT_EQ(Quantile({3, 1, 2}, 1.0), 3);
 }
 
-TimedFrame Timed(std::vector<double> milliseconds) {
-  TimedFrame frame;
-  frame.milliseconds = std::move(milliseconds);
-  return frame;
-}
-
-TEST(TimeRatio, IsTakenWithinTurns) {
+TEST(MedianRatio, IsTakenWithinTurns) {
+  const auto ratio = [](const std::vector<double>& a, const std::vector<double>& b) {
+    return MedianRatio(a, b);
+  };
   // The machine slows down to a third after the first turn.
-  EXPECT_EQ(TimeRatio(Timed({2, 6, 6}), Timed({1, 3, 3})), 2);
+  EXPECT_EQ(ratio({2, 6, 6}, {1, 3, 3}), 2);
   // One turn disturbed.
-  EXPECT_EQ(TimeRatio(Timed({2, 90, 2}), Timed({1, 1, 1})), 2);
+  EXPECT_EQ(ratio({2, 90, 2}, {1, 1, 1}), 2);
 }
 
 TEST(Stages, AreMediansInTheOrderOfTheFirstRepeat) {

@@ -1,5 +1,8 @@
 #include "tests/measure/plume_scene.h"
 
+#define GLM_ENABLE_EXPERIMENTAL
+#include <glm/gtx/rotate_vector.hpp>
+
 #include "absl/status/status.h"
 #include "absl/strings/str_cat.h"
 #include "tests/oracle/plume.h"
@@ -7,8 +10,11 @@
 
 namespace halflight::measure {
 
-Camera PlumeCamera(int width, int height) {
-  return test::LookAt({0.5, 1.5, 4.6}, {0.0, 1.25, 0.0}, width, height);
+Camera PlumeCamera(int width, int height, double turn_degrees) {
+  const glm::dvec3 target(0.0, 1.25, 0.0);
+  const glm::dvec3 eye(0.5, 1.5, 4.6);
+  return test::LookAt(target + glm::rotateY(eye - target, turn_degrees * test::kDegree), target,
+                      width, height);
 }
 
 absl::StatusOr<std::shared_ptr<const ParticleSet>> LoadPlumeFrame(const std::string& data_folder,

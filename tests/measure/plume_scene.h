@@ -22,7 +22,8 @@ inline constexpr float kPlumeJitter = 0.5F * kPlumeRadius;
 // In which light travels that comes from the left, somewhat from above and from behind the camera.
 inline constexpr glm::dvec3 kSideLight{1.0, -0.6, -0.6};
 
-Camera PlumeCamera(int width, int height);
+// Turned round the plume by so many degrees.
+Camera PlumeCamera(int width, int height, double turn_degrees = 0.0);
 
 // plume/plume.<frame>.ply in the folder; `frame` has four digits. NotFound, naming the file, where
 // it cannot be read or has no particles.

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <chrono>
-#include <cmath>
 #include <memory>
 
 namespace halflight::measure {
@@ -12,7 +11,8 @@ double Quantile(std::vector<double> values, double part) {
   const double place = part * static_cast<double>(values.size() - 1);
   const auto below = static_cast<size_t>(place);
   const size_t above = std::min(below + 1, values.size() - 1);
-  return std::lerp(values[below], values[above], place - static_cast<double>(below));
+  const double share = place - static_cast<double>(below);
+  return (1.0 - share) * values[below] + share * values[above];
 }
 
 double Median(std::vector<double> values) { return Quantile(std::move(values), 0.5); }
@@ -72,16 +72,12 @@ std::vector<StageTiming> MedianStages(const TimedFrame& frame) {
   return medians;
 }
 
-std::vector<double> TimeRatios(const TimedFrame& frame, const TimedFrame& baseline) {
+double MedianRatio(std::span<const double> milliseconds, std::span<const double> baseline) {
   std::vector<double> ratios;
-  for (size_t turn = 0; turn < frame.milliseconds.size(); ++turn) {
-    ratios.push_back(frame.milliseconds[turn] / baseline.milliseconds[turn]);
+  for (size_t turn = 0; turn < milliseconds.size(); ++turn) {
+    ratios.push_back(milliseconds[turn] / baseline[turn]);
   }
-  return ratios;
-}
-
-double TimeRatio(const TimedFrame& frame, const TimedFrame& baseline) {
-  return Median(TimeRatios(frame, baseline));
+  return Median(std::move(ratios));
 }
 
 }  // namespace halflight::measure

@@ -49,10 +49,8 @@ FrameRequest FirstSeen(const Scene& scene);
 // The medians over the repeats, by stage, in the order in which the first repeat has them.
 std::vector<StageTiming> MedianStages(const TimedFrame& frame);
 
-// What a frame took in parts of what `baseline` took in the same repeat, one a repeat; both were
-// timed together.
-std::vector<double> TimeRatios(const TimedFrame& frame, const TimedFrame& baseline);
-// Their median.
-double TimeRatio(const TimedFrame& frame, const TimedFrame& baseline);
+// The median over the repeats of what a frame took in parts of what `baseline` took in the same
+// repeat: both were timed together, and have one value a repeat.
+double MedianRatio(std::span<const double> milliseconds, std::span<const double> baseline);
 
 }  // namespace halflight::measure

@@ -27,13 +27,14 @@ absl::StatusOr<std::vector<Image>> TimeJobs(FrameRenderer& renderer, const std::
   std::vector<Image> images;
   for (size_t i = 0; i < jobs.size(); ++i) {
     measure::TimedFrame& frame = (*frames)[i];
-    results.measurements.push_back({.scene = jobs[i].scene,
-                                    .setting = jobs[i].setting,
-                                    .repeats = repeats,
-                                    .milliseconds = measure::Median(frame.milliseconds),
-                                    .time_ratio = measure::TimeRatio(frame, (*frames)[baseline]),
-                                    .error = {},
-                                    .on_front = false});
+    results.measurements.push_back(
+        {.scene = jobs[i].scene,
+         .setting = jobs[i].setting,
+         .repeats = repeats,
+         .milliseconds = measure::Median(frame.milliseconds),
+         .time_ratio = measure::MedianRatio(frame.milliseconds, (*frames)[baseline].milliseconds),
+         .error = {},
+         .on_front = false});
     images.push_back(std::move(frame.beauty));
   }
   return images;
