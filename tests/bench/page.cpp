@@ -177,7 +177,7 @@ class Writer {
     }
     const Row& any = results_.service.front();
     absl::StrAppendFormat(&text_,
-                          "%s pixels, over a unix socket, the server in the same process. Frames "
+                          "%s pixels, from a halflightd of its own over a unix socket. Frames "
                           "of a sequence have particles of their own; their time is the whole "
                           "sequence's in parts.\n\n",
                           SizeOf(any));

@@ -13,8 +13,9 @@ namespace halflight::bench {
 
 struct MeasureOptions {
   std::string data_folder = "tests/data";
-  bool short_form = false;  // small frames, few of them: checks the tool, measures nothing
-  int repeats = 15;         // of one frame; the other parts take fewer
+  std::string device = "auto";  // as RenderThreadOptions; the service's renderer too
+  bool short_form = false;      // small frames, few of them: checks the tool, measures nothing
+  int repeats = 15;             // of one frame; the other parts take fewer
   bool device_sizes = false;
   // Called with what is about to be measured.
   std::function<void(const std::string& what)> progress = [](const std::string&) {};

@@ -23,7 +23,6 @@ struct ProgramOptions {
   MeasureOptions measure;
   std::string page = "docs/benchmark.md";
   std::string figures = "out/bench/figures.json";
-  std::string device = "auto";
   Making making;
 };
 
@@ -45,7 +44,7 @@ double LoadOfMachine() {
 
 absl::Status Measure(ProgramOptions options, const ServicePart& service) {
   options.making.load = LoadOfMachine();
-  const auto renderer = FrameRenderer::Create(options.device);
+  const auto renderer = FrameRenderer::Create(options.measure.device);
   if (!renderer.ok()) return renderer.status();
   const DeviceInfo& device = (*renderer)->device();
   if (!device.software) options.measure.device_sizes = true;
@@ -61,7 +60,8 @@ absl::Status Measure(ProgramOptions options, const ServicePart& service) {
   results->goals = JudgeRenderer(*results);
   if (service) {
     options.measure.progress("service");
-    if (absl::Status status = service(options.measure, *results); !status.ok()) return status;
+    if (absl::Status status = service(**renderer, options.measure, *results); !status.ok())
+      return status;
   }
 
   absl::Status status = WriteFile(options.figures, WriteFigures(*results, options.making));
@@ -82,7 +82,7 @@ int RunProgram(int argc, char** argv, const ServicePart& service) {
   app.add_option("--data", options.measure.data_folder, "Folder that holds plume/")
       ->capture_default_str();
   const CLI::Option* const device =
-      app.add_option("--device", options.device, "As of halflightd")->capture_default_str();
+      app.add_option("--device", options.measure.device, "As of halflightd")->capture_default_str();
   const CLI::Option* const repeats =
       app.add_option("--repeats", options.measure.repeats, "Timed turns of one frame, at most")
           ->check(CLI::Range(1, 1000))
@@ -106,7 +106,8 @@ int RunProgram(int argc, char** argv, const ServicePart& service) {
   if (repeats->count() > 0) {
     absl::StrAppend(&options.making.command, " --repeats ", options.measure.repeats);
   }
-  if (device->count() > 0) absl::StrAppend(&options.making.command, " --device ", options.device);
+  if (device->count() > 0)
+    absl::StrAppend(&options.making.command, " --device ", options.measure.device);
 
   const absl::Status status = Measure(options, service);
   if (!status.ok()) {

@@ -4,12 +4,14 @@
 #include <functional>
 
 #include "absl/status/status.h"
+#include "renderer/frame_renderer.h"
 #include "tests/bench/parts.h"
 
 namespace halflight::bench {
 
 // Measures more into the results, and judges it.
-using ServicePart = std::function<absl::Status(const MeasureOptions& options, Results& results)>;
+using ServicePart = std::function<absl::Status(FrameRenderer& renderer,
+                                               const MeasureOptions& options, Results& results)>;
 
 // Exit code of the program. `service` may be empty.
 int RunProgram(int argc, char** argv, const ServicePart& service);
