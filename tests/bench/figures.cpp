@@ -61,6 +61,7 @@ std::string RowObject(const Row& row) {
   object.AddJson("milliseconds",
                  Array(row.milliseconds, [](double value) { return JsonNumber(value); }));
   object.AddJson("stages", Array(row.stages, StageObject));
+  if (!row.failure.empty()) object.Add("failure", row.failure);
   if (row.error) object.AddJson("relative_error", ErrorObject(*row.error));
   return object.Text();
 }

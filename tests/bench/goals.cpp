@@ -16,8 +16,9 @@ constexpr double kSlicesChange = 0.1;
 constexpr double kFollowingFrame = 0.7;
 
 const Row* Find(const Group& group, Role role) {
-  const auto found =
-      std::find_if(group.begin(), group.end(), [&](const Row& row) { return row.role == role; });
+  const auto found = std::find_if(group.begin(), group.end(), [&](const Row& row) {
+    return row.role == role && row.failure.empty();
+  });
   return found == group.end() ? nullptr : &*found;
 }
 
@@ -46,7 +47,7 @@ void JudgeSlices(const Group& slices, std::vector<Goal>& goals) {
   double change = 0.0;
   int most = first->slices;
   for (const Row& row : slices) {
-    if (row.role != Role::kOurs) continue;
+    if (row.role != Role::kOurs || !row.failure.empty()) continue;
     change = std::max(change, std::abs(TimeRatio(row, *first) - 1.0));
     most = row.slices;
   }
@@ -56,10 +57,11 @@ void JudgeSlices(const Group& slices, std::vector<Goal>& goals) {
 
 void JudgeTurntable(const Group& turntable, std::vector<Goal>& goals) {
   for (size_t i = 0; i + 1 < turntable.size(); i += 2) {
-    if (turntable[i].role != Role::kOurs) continue;
-    goals.push_back({"a turntable's frame in parts of the first",
-                     TimeRatio(turntable[i + 1], turntable[i]), kFollowingFrame, false,
-                     turntable[i + 1].name});
+    const Row& first = turntable[i];
+    const Row& following = turntable[i + 1];
+    if (first.role != Role::kOurs || !first.failure.empty() || !following.failure.empty()) continue;
+    goals.push_back({"a turntable's frame in parts of the first", TimeRatio(following, first),
+                     kFollowingFrame, false, following.name});
   }
 }
 

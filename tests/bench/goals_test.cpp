@@ -65,6 +65,25 @@ TEST(Goals, ThatNothingReachesInErrorAreNotJudged) {
   EXPECT_THAT(JudgeRenderer(Results{}), IsEmpty());
 }
 
+TEST(Goals, LeaveOutWhatFailed) {
+  Results results = MadeUp();
+  const auto fail = [](Row& row) {
+    row.failure = "no";
+    row.milliseconds.clear();
+    row.error.reset();
+  };
+  fail(results.frame.front());
+  fail(results.frame.back());
+  results.turntable = {RowOf("ours, first", Role::kOurs, {1}, 0),
+                       RowOf("ours, following", Role::kOurs, {1}, 0)};
+  fail(results.turntable.back());
+  const std::vector<Goal> goals = JudgeRenderer(results);
+  ASSERT_EQ(goals.size(), 1U);
+  EXPECT_THAT(goals[0].what, HasSubstr("interpolated"));
+  results.goals = goals;
+  EXPECT_THAT(WriteFigures(results, {}), HasSubstr("\"failure\":\"no\""));
+}
+
 TEST(Goals, TakeTheLargestChangeOverSlicesOfOursAlone) {
   Results results;
   for (const auto& [slices, milliseconds] : {std::pair(16, 10.0), {64, 9.2}, {256, 10.5}}) {

@@ -23,11 +23,20 @@ std::string Milliseconds(double value) {
   return absl::StrFormat("%.0f", value);
 }
 
-std::string MedianOf(const Row& row) { return Milliseconds(measure::Median(row.milliseconds)); }
+std::string MedianOf(const Row& row) {
+  if (!row.failure.empty()) return "failed: " + row.failure;
+  return Milliseconds(measure::Median(row.milliseconds));
+}
 
 std::string QuartilesOf(const Row& row) {
+  if (!row.failure.empty()) return "";
   return absl::StrCat(Milliseconds(measure::Quantile(row.milliseconds, 0.25)), " to ",
                       Milliseconds(measure::Quantile(row.milliseconds, 0.75)));
+}
+
+std::string RatioOf(const Row& row, const Row& other) {
+  if (!row.failure.empty() || !other.failure.empty()) return "";
+  return Times(TimeRatio(row, other));
 }
 
 std::string ErrorOf(const Row& row) {
@@ -103,7 +112,7 @@ class Writer {
         any.particles, SizeOf(any));
     Head({"", "ms", "quartiles", absl::StrCat("of ", any.name), "error"});
     for (const Row& row : results_.frame) {
-      Add({row.name, MedianOf(row), QuartilesOf(row), Times(TimeRatio(row, any)), ErrorOf(row)});
+      Add({row.name, MedianOf(row), QuartilesOf(row), RatioOf(row, any), ErrorOf(row)});
     }
     text_ += "\n";
   }
@@ -194,6 +203,10 @@ class Writer {
     Head({"particles", "pixels", "", "device, frames/s", "whole, frames/s", "stages, ms"});
     for (const Group& group : results_.device) {
       for (const Row& row : group) {
+        if (!row.failure.empty()) {
+          Add({absl::StrCat(row.particles), SizeOf(row), row.name, MedianOf(row), "", ""});
+          continue;
+        }
         const std::optional<double> device = row.device_frames_per_second();
         Add({absl::StrCat(row.particles), SizeOf(row), row.name,
              device ? absl::StrFormat("%.1f", *device) : "none timed there",

@@ -75,6 +75,10 @@ class Bench {
     row.width = scene.camera.width;
     row.height = scene.camera.height;
     row.slices = scene.shadow.slices;
+    if (!frame.status.ok()) {
+      row.failure = frame.status.ToString();
+      return row;
+    }
     row.milliseconds = frame.milliseconds;
     row.stages = measure::MedianStages(frame);
     return row;
@@ -87,25 +91,26 @@ class Bench {
     for (const Contestant& contestant : contestants) {
       entrants.push_back({DrawOf(contestant, renderer_), Apply(contestant, scene)});
     }
-    const auto frames = measure::TimeInTurns(entrants, repeats);
-    if (!frames.ok()) return frames.status();
+    const std::vector<TimedFrame> frames = measure::TimeInTurns(entrants, repeats);
     Group group;
     for (size_t i = 0; i < contestants.size(); ++i) {
       group.push_back(
-          RowOf(contestants[i].name, contestants[i].role, entrants[i].scene, (*frames)[i]));
+          RowOf(contestants[i].name, contestants[i].role, entrants[i].scene, frames[i]));
     }
     if (scene.particles->size() > kMostReferenced) return group;
     if (every_pixel) {
       const measure::CoveredReference reference = measure::EvaluateCovered(scene);
       for (size_t i = 0; i < group.size(); ++i) {
-        group[i].error = measure::CompareAll((*frames)[i].beauty, reference);
+        if (!group[i].failure.empty()) continue;
+        group[i].error = measure::CompareAll(frames[i].beauty, reference);
       }
       return group;
     }
     const auto evaluator = reference::Evaluator::Create(scene);
     if (!evaluator.ok()) return evaluator.status();
     for (size_t i = 0; i < group.size(); ++i) {
-      const auto error = measure::CompareSample((*frames)[i].beauty, **evaluator);
+      if (!group[i].failure.empty()) continue;
+      const auto error = measure::CompareSample(frames[i].beauty, **evaluator);
       if (!error.ok()) return error.status();
       group[i].error = *error;
     }
@@ -180,15 +185,19 @@ class Bench {
           request.scene.camera = measure::PlumeCamera(
               scene.camera.width, scene.camera.height,
               kTurntableStep * static_cast<double>(turn * kTurntableFrames + i));
-          TimedFrame& frame = i == 0 ? first : turned;
-          if (absl::Status s = measure::TimeFrame(draw, request, frame); !s.ok()) return s;
+          measure::TimeFrame(draw, request, i == 0 ? first : turned);
+        }
+        if (!first.status.ok() || !turned.status.ok()) {
+          following.status = first.status.ok() ? turned.status : first.status;
+          first.status = following.status;
+          break;
+        }
+        if (turn == 0) {  // warms up
+          first = TimedFrame{};
+          continue;
         }
         following.milliseconds.push_back(measure::Median(turned.milliseconds));
         following.stages.push_back(measure::MedianStages(turned));
-      }
-      for (TimedFrame* frame : {&first, &following}) {  // the first turn warms up
-        frame->milliseconds.erase(frame->milliseconds.begin());
-        frame->stages.erase(frame->stages.begin());
       }
       results.turntable.push_back(
           RowOf(contestant.name + ", first frame", contestant.role, scene, first));

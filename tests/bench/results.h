@@ -23,6 +23,7 @@ struct Row {
   int slices = 0;                    // asked for
   std::vector<double> milliseconds;  // one a turn, in the order of the turns
   std::vector<StageTiming> stages;   // medians
+  std::string failure;               // why there is no frame; then all figures are empty
   std::optional<measure::FrameError> error;
 
   // Frames a second by the device's own clock: what the stages timed there add up to. None where

@@ -81,22 +81,28 @@ TEST(Turns, GoRoundWithParticlesThatWereNeverSeen) {
   Scene scene;
   scene.particles = std::make_shared<const ParticleSet>(Row(1));
   const std::vector<Entrant> entrants = {{recorder.As('a'), scene}, {recorder.As('b'), scene}};
-  const auto frames = TimeInTurns(entrants, 3);
-  ASSERT_TRUE(frames.ok());
+  const std::vector<TimedFrame> frames = TimeInTurns(entrants, 3);
   EXPECT_EQ(recorder.asked, "abababab");
   EXPECT_EQ(recorder.seen.size(), 8U);
   EXPECT_FALSE(recorder.seen.contains(scene.particles));
-  for (const TimedFrame& frame : *frames) EXPECT_EQ(frame.milliseconds.size(), 3U);
-  EXPECT_EQ((*frames)[1].beauty.pixels, std::vector<float>{2});  // of the turn that warms up
+  for (const TimedFrame& frame : frames) EXPECT_EQ(frame.milliseconds.size(), 3U);
+  EXPECT_EQ(frames[1].beauty.pixels, std::vector<float>{2});  // of the turn that warms up
 }
 
-TEST(Turns, EndWithTheFirstError) {
-  const Draw refuse = [](const FrameRequest&) -> absl::StatusOr<FrameResult> {
+TEST(Turns, LeaveOutWhoseFrameFails) {
+  Recorder recorder;
+  int refused = 0;
+  const Draw refuse = [&](const FrameRequest&) -> absl::StatusOr<FrameResult> {
+    ++refused;
     return absl::InvalidArgumentError("no");
   };
   Scene scene;
   scene.particles = std::make_shared<const ParticleSet>();
-  EXPECT_EQ(TimeInTurns(std::vector<Entrant>{{refuse, scene}}, 3).status().message(), "no");
+  const std::vector<TimedFrame> frames =
+      TimeInTurns(std::vector<Entrant>{{refuse, scene}, {recorder.As('a'), scene}}, 2);
+  EXPECT_EQ(frames[0].status.message(), "no");
+  EXPECT_EQ(refused, 1);
+  EXPECT_EQ(recorder.asked, "aaa");
 }
 
 double SumOfOpticalDepths(const Replica& replica) {

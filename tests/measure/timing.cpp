@@ -27,26 +27,26 @@ FrameRequest FirstSeen(const Scene& scene) {
   return request;
 }
 
-absl::Status TimeFrame(const Draw& draw, const FrameRequest& request, TimedFrame& frame) {
+void TimeFrame(const Draw& draw, const FrameRequest& request, TimedFrame& frame) {
+  if (!frame.status.ok()) return;
   const auto begin = std::chrono::steady_clock::now();
   absl::StatusOr<FrameResult> result = draw(request);
   const auto end = std::chrono::steady_clock::now();
-  if (!result.ok()) return result.status();
+  if (!result.ok()) {
+    frame.status = result.status();
+    return;
+  }
   if (frame.beauty.pixels.empty()) frame.beauty = std::move(result->images.at(0));
   frame.milliseconds.push_back(std::chrono::duration<double, std::milli>(end - begin).count());
   frame.stages.push_back(std::move(result->timings));
-  return absl::OkStatus();
 }
 
-absl::StatusOr<std::vector<TimedFrame>> TimeInTurns(std::span<const Entrant> entrants,
-                                                    int repeats) {
+std::vector<TimedFrame> TimeInTurns(std::span<const Entrant> entrants, int repeats) {
   std::vector<TimedFrame> frames(entrants.size());
   for (int turn = 0; turn <= repeats; ++turn) {
     for (size_t i = 0; i < entrants.size(); ++i) {
-      const FrameRequest request = FirstSeen(entrants[i].scene);
-      if (absl::Status status = TimeFrame(entrants[i].draw, request, frames[i]); !status.ok()) {
-        return status;
-      }
+      if (!frames[i].status.ok()) continue;
+      TimeFrame(entrants[i].draw, FirstSeen(entrants[i].scene), frames[i]);
       if (turn == 0) {
         frames[i].milliseconds.clear();
         frames[i].stages.clear();

@@ -30,6 +30,7 @@ struct Entrant {
 };
 
 struct TimedFrame {
+  absl::Status status;  // of the last frame; where it is an error, the rest says nothing
   Image beauty;
   std::vector<double> milliseconds;              // one a repeat, from request to pixels in memory
   std::vector<std::vector<StageTiming>> stages;  // one a repeat
@@ -37,11 +38,12 @@ struct TimedFrame {
 
 // Draws every scene once to warm up, untimed, then all of them `repeats` times in turns. Each frame
 // has particles that were never seen before, copied beforehand, so that nothing of an earlier frame
-// can be used again. The thread of the renderers that draw. Errors as FrameRenderer::Render.
-absl::StatusOr<std::vector<TimedFrame>> TimeInTurns(std::span<const Entrant> entrants, int repeats);
+// can be used again. Whose frame fails is left out of the turns that follow. The thread of the
+// renderers that draw.
+std::vector<TimedFrame> TimeInTurns(std::span<const Entrant> entrants, int repeats);
 
-// Times one frame and adds it; the first one's image is kept. Errors as TimeInTurns.
-absl::Status TimeFrame(const Draw& draw, const FrameRequest& request, TimedFrame& frame);
+// Times one frame and adds it, unless one of those before it failed; the first one's image is kept.
+void TimeFrame(const Draw& draw, const FrameRequest& request, TimedFrame& frame);
 
 // The scene's beauty, of a copy of its particles.
 FrameRequest FirstSeen(const Scene& scene);

@@ -22,17 +22,17 @@ absl::StatusOr<std::vector<Image>> TimeJobs(FrameRenderer& renderer, const std::
     entrants.push_back({measure::DrawWith(renderer),
                         Apply(results.settings[job.setting], results.scenes[job.scene].scene)});
   }
-  absl::StatusOr<std::vector<measure::TimedFrame>> frames = measure::TimeInTurns(entrants, repeats);
-  if (!frames.ok()) return frames.status();
+  std::vector<measure::TimedFrame> frames = measure::TimeInTurns(entrants, repeats);
   std::vector<Image> images;
   for (size_t i = 0; i < jobs.size(); ++i) {
-    measure::TimedFrame& frame = (*frames)[i];
+    measure::TimedFrame& frame = frames[i];
+    if (!frame.status.ok()) return frame.status;
     results.measurements.push_back(
         {.scene = jobs[i].scene,
          .setting = jobs[i].setting,
          .repeats = repeats,
          .milliseconds = measure::Median(frame.milliseconds),
-         .time_ratio = measure::MedianRatio(frame.milliseconds, (*frames)[baseline].milliseconds),
+         .time_ratio = measure::MedianRatio(frame.milliseconds, frames[baseline].milliseconds),
          .error = {},
          .on_front = false});
     images.push_back(std::move(frame.beauty));
