@@ -65,6 +65,10 @@ class Bench {
         measure::kSideLight, size.width, size.height);
   }
   Size FrameSize() const { return options_.short_form ? kShortFrame : kFrame; }
+  // Frames of a million particles take seconds.
+  int RepeatsOf(size_t particles) const {
+    return Repeats(particles > 1'048'576 ? 2 : (particles > kMostReferenced ? 3 : 7));
+  }
   int Repeats(int most) const { return options_.short_form ? 2 : std::min(options_.repeats, most); }
 
   static Row RowOf(std::string name, Role role, const Scene& scene, const TimedFrame& frame) {
@@ -138,9 +142,7 @@ class Bench {
       if (options_.short_form && count > kCounts.front()) continue;
       Size size = FrameSize();
       size.particles = count;
-      // Frames of a million particles take seconds.
-      const int most = count > 1'048'576 ? 2 : (count > kMostReferenced ? 3 : 7);
-      auto group = MeasureGroup(SceneOf(size), Few(), Repeats(most), false);
+      auto group = MeasureGroup(SceneOf(size), Few(), RepeatsOf(count), false);
       if (!group.ok()) return group.status();
       results.particles.push_back(*std::move(group));
     }
@@ -211,7 +213,7 @@ class Bench {
     if (!options_.device_sizes) return absl::OkStatus();
     for (const Size& size : kDeviceSizes) {
       if (options_.short_form && size.particles > kDeviceSizes.front().particles) continue;
-      auto group = MeasureGroup(SceneOf(size), ListContestants(true), Repeats(7), false);
+      auto group = MeasureGroup(SceneOf(size), Few(), RepeatsOf(size.particles), false);
       if (!group.ok()) return group.status();
       results.device.push_back(*std::move(group));
     }

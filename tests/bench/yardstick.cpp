@@ -266,15 +266,8 @@ Yardstick::Yardstick(Yardstick&&) noexcept = default;
 Yardstick& Yardstick::operator=(Yardstick&&) noexcept = default;
 Yardstick::~Yardstick() = default;
 
-bool Yardstick::Runs() {
-#ifdef HALFLIGHT_YARDSTICK
-  return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
-#else
-  return false;
-#endif
-}
+bool Yardstick::Runs() { return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma"); }
 
-#ifdef HALFLIGHT_YARDSTICK
 namespace {
 
 // Rows of the light buffer from which each thread's begin, so that all have as many particles.
@@ -428,10 +421,5 @@ absl::StatusOr<FrameResult> Yardstick::Draw(const FrameRequest& request) {
   result.timings = std::move(team).timings();
   return result;
 }
-#else
-absl::StatusOr<FrameResult> Yardstick::Draw(const FrameRequest&) {
-  return absl::UnimplementedError("yardstick: built without AVX2 and FMA");
-}
-#endif
 
 }  // namespace halflight::bench

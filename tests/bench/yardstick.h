@@ -13,7 +13,7 @@ namespace halflight::bench {
 
 class Yardstick {
  public:
-  // Whether this CPU has AVX2 and FMA, and the program was built for them.
+  // Whether this CPU has AVX2 and FMA.
   static bool Runs();
 
   Yardstick();
