@@ -83,7 +83,7 @@ std::string MakingObject(const Making& making) {
   JsonObject object;
   object.Add("cpu", making.cpu);
   object.AddNumber("cores", making.cores);
-  object.AddNumber("load", making.load);
+  object.AddNumber("others", making.others);
   object.Add("gl_renderer", making.gl_renderer);
   object.Add("gl_version", making.gl_version);
   object.Add("version", making.version);

@@ -8,7 +8,7 @@ namespace halflight::bench {
 struct Making {
   std::string cpu;
   unsigned cores = 0;
-  double load = 0.0;  // processes that ran or waited on the machine as the run began
+  double others = 0.0;  // part of the cores that other programs took meanwhile
   std::string gl_renderer;
   std::string gl_version;
   std::string version;

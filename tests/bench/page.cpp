@@ -18,6 +18,9 @@ using measure::Percent;
 using measure::Rule;
 using measure::Times;
 
+// Of the cores, what other programs may take where figures are to mean anything.
+constexpr double kIdle = 0.05;
+
 std::string Milliseconds(double value) {
   if (value < 9.95) return absl::StrFormat("%.1f", value);
   return absl::StrFormat("%.0f", value);
@@ -66,6 +69,12 @@ class Writer {
       text_ +=
           "**Short form, to check the tool: frames too small and too few for figures that mean "
           "anything.**\n\n";
+    }
+    if (making_.others > kIdle) {
+      absl::StrAppendFormat(&text_,
+                            "**The machine was not idle: other programs took %.0f %% of it. Times "
+                            "are too long, and ratios loose.**\n\n",
+                            100.0 * making_.others);
     }
     WriteGoals();
     WriteFrame();
@@ -223,8 +232,8 @@ class Writer {
     };
     add("Command", absl::StrCat("`", making_.command, "`, ", making_.date));
     add("Version", making_.version);
-    add("Machine", absl::StrFormat("%s, %d cores; load as it began %.1f", making_.cpu,
-                                   making_.cores, making_.load));
+    add("Machine", absl::StrFormat("%s, %d cores, of which other programs took %.0f %%",
+                                   making_.cpu, making_.cores, 100.0 * making_.others));
     add("GL renderer", absl::StrCat(making_.gl_renderer, "; OpenGL ", making_.gl_version));
     add("Time", absl::StrFormat("from request to pixels in memory, without encoding; medians of "
                                 "%d turns after one to warm up, fewer for large frames",

@@ -1,6 +1,7 @@
 #include "tests/bench/program.h"
 
-#include <cstdlib>
+#include <algorithm>
+#include <chrono>
 #include <filesystem>
 #include <fstream>
 #include <iostream>
@@ -37,13 +38,9 @@ absl::Status WriteFile(const std::string& path, const std::string& bytes) {
   return absl::OkStatus();
 }
 
-double LoadOfMachine() {
-  double load = 0.0;
-  return getloadavg(&load, 1) == 1 ? load : 0.0;
-}
-
 absl::Status Measure(ProgramOptions options, const ServicePart& service) {
-  options.making.load = LoadOfMachine();
+  const measure::CpuSeconds cpu_begin = measure::CpuSecondsSoFar();
+  const auto begin = std::chrono::steady_clock::now();
   const auto renderer = FrameRenderer::Create(options.measure.device);
   if (!renderer.ok()) return renderer.status();
   const DeviceInfo& device = (*renderer)->device();
@@ -63,6 +60,10 @@ absl::Status Measure(ProgramOptions options, const ServicePart& service) {
     if (absl::Status status = service(**renderer, options.measure, *results); !status.ok())
       return status;
   }
+  const measure::CpuSeconds cpu_end = measure::CpuSecondsSoFar();
+  const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - begin;
+  const double others = (cpu_end.all - cpu_begin.all) - (cpu_end.own - cpu_begin.own);
+  options.making.others = std::max(0.0, others / (elapsed.count() * options.making.cores));
 
   absl::Status status = WriteFile(options.figures, WriteFigures(*results, options.making));
   if (status.ok()) status = WriteFile(options.page, WritePage(*results, options.making));

@@ -11,6 +11,7 @@
 
 #include <glm/geometric.hpp>
 
+#include "tests/measure/machine.h"
 #include "tests/measure/replicate.h"
 #include "tests/measure/timing.h"
 
@@ -45,6 +46,18 @@ TEST(MedianRatio, IsTakenWithinTurns) {
   EXPECT_EQ(ratio({2, 6, 6}, {1, 3, 3}), 2);
   // One turn disturbed.
   EXPECT_EQ(ratio({2, 90, 2}, {1, 1, 1}), 2);
+}
+
+TEST(CpuSeconds, GrowWithWhatThisProgramDoes) {
+  const CpuSeconds begin = CpuSecondsSoFar();
+  CpuSeconds now = begin;
+  volatile double sum = 0.0;
+  while (now.own < begin.own + 1.0 && !(now.own > begin.own && now.all > begin.all)) {
+    for (int i = 0; i < 100000; ++i) sum = sum + i;
+    now = CpuSecondsSoFar();
+  }
+  EXPECT_GT(now.own, begin.own);
+  EXPECT_GT(now.all, begin.all);
 }
 
 TEST(Stages, AreMediansInTheOrderOfTheFirstRepeat) {
