@@ -29,6 +29,7 @@ class Yardstick {
 
  private:
   struct Buffers;
+  class Frame;
   std::unique_ptr<Buffers> buffers_;  // kept for their memory alone
 };
 
