@@ -17,7 +17,8 @@ namespace halflight::bench {
 // All threads run the same function, and wait for one another after each stage.
 class Team {
  public:
-  explicit Team(size_t threads) : threads_(threads), barrier_(static_cast<ptrdiff_t>(threads)) {}
+  explicit Team(size_t threads)
+      : threads_(threads), barrier_(static_cast<ptrdiff_t>(threads), ForgetJobs{next_job_}) {}
 
   [[nodiscard]] size_t threads() const { return threads_; }
 
@@ -33,7 +34,6 @@ class Team {
   void Wait() { barrier_.arrive_and_wait(); }
   // The same, at the end of a stage.
   void EndStage(size_t thread, const char* stage) {
-    next_job_ = 0;
     Wait();
     if (thread != 0) return;
     const auto now = Clock::now();
@@ -53,9 +53,15 @@ class Team {
  private:
   using Clock = std::chrono::steady_clock;
 
+  // Once all have arrived, and before any goes on: who comes late must not find them new.
+  struct ForgetJobs {
+    std::atomic<size_t>& next_job;
+    void operator()() noexcept { next_job = 0; }
+  };
+
   size_t threads_;
-  std::barrier<> barrier_;
   std::atomic<size_t> next_job_ = 0;
+  std::barrier<ForgetJobs> barrier_;
   Clock::time_point last_;
   std::vector<StageTiming> timings_;
 };
