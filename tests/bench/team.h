@@ -18,7 +18,7 @@ namespace halflight::bench {
 class Team {
  public:
   explicit Team(size_t threads)
-      : threads_(threads), barrier_(static_cast<ptrdiff_t>(threads), ForgetJobs{next_job_}) {}
+      : threads_(threads), barrier_(static_cast<ptrdiff_t>(threads), AtArrival{*this}) {}
 
   [[nodiscard]] size_t threads() const { return threads_; }
 
@@ -36,9 +36,9 @@ class Team {
   void EndStage(size_t thread, const char* stage) {
     Wait();
     if (thread != 0) return;
-    const auto now = Clock::now();
-    timings_.push_back({stage, std::chrono::duration<double, std::milli>(now - last_).count()});
-    last_ = now;
+    timings_.push_back(
+        {stage, std::chrono::duration<double, std::milli>(arrived_ - last_).count()});
+    last_ = arrived_;
   }
 
   // Of this thread, [begin, end) of `count`.
@@ -53,16 +53,21 @@ class Team {
  private:
   using Clock = std::chrono::steady_clock;
 
-  // Once all have arrived, and before any goes on: who comes late must not find them new.
-  struct ForgetJobs {
-    std::atomic<size_t>& next_job;
-    void operator()() noexcept { next_job = 0; }
+  // Once all have arrived, and before any goes on: who wakes late must not find the jobs new, and
+  // when it woke is not when the stage ended.
+  struct AtArrival {
+    Team& team;
+    void operator()() noexcept {
+      team.next_job_ = 0;
+      team.arrived_ = Clock::now();
+    }
   };
 
   size_t threads_;
   std::atomic<size_t> next_job_ = 0;
-  std::barrier<ForgetJobs> barrier_;
-  Clock::time_point last_;
+  std::barrier<AtArrival> barrier_;
+  Clock::time_point last_;  // when the stage before ended
+  Clock::time_point arrived_;
   std::vector<StageTiming> timings_;
 };
 
