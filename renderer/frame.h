@@ -43,6 +43,7 @@ struct LightReport {
 struct StageTiming {
   std::string stage;
   double milliseconds = 0.0;
+  bool on_device = false;  // timed there, by GL timestamps
 };
 
 struct FrameResult {

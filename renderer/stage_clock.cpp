@@ -38,24 +38,24 @@ void StageClock::EndStage() {
   }
   if (!cpu_stage_.empty()) {
     const std::chrono::duration<double, std::milli> elapsed = Clock::now() - cpu_begin_;
-    Add(std::exchange(cpu_stage_, {}), elapsed.count());
+    Add(std::exchange(cpu_stage_, {}), elapsed.count(), false);
   }
 }
 
-void StageClock::Add(const std::string& stage, double milliseconds) {
+void StageClock::Add(const std::string& stage, double milliseconds, bool on_device) {
   for (StageTiming& timing : timings_) {
     if (timing.stage == stage) {
       timing.milliseconds += milliseconds;
       return;
     }
   }
-  timings_.push_back({stage, milliseconds});
+  timings_.push_back({stage, milliseconds, on_device});
 }
 
 std::vector<StageTiming> StageClock::Finish() {
   EndStage();
   for (const GpuSpan& span : gpu_spans_) {
-    Add(span.stage, (Nanoseconds(span.end) - Nanoseconds(span.begin)) * 1e-6);
+    Add(span.stage, (Nanoseconds(span.end) - Nanoseconds(span.begin)) * 1e-6, true);
   }
   return std::move(timings_);
 }

@@ -33,7 +33,7 @@ class StageClock {
   };
 
   void EndStage();
-  void Add(const std::string& stage, double milliseconds);
+  void Add(const std::string& stage, double milliseconds, bool on_device);
 
   std::vector<StageTiming> timings_;
   std::vector<GpuSpan> gpu_spans_;

@@ -95,6 +95,18 @@ void Set(const Material& from, v1::Material& to) {
   }
 }
 
+v1::ShadowTechnique TechniqueOf(ShadowTechniqueKind technique) {
+  switch (technique) {
+    case ShadowTechniqueKind::kHalfAngle:
+      return v1::SHADOW_TECHNIQUE_HALF_ANGLE;
+    case ShadowTechniqueKind::kReference:
+      return v1::SHADOW_TECHNIQUE_REFERENCE;
+    case ShadowTechniqueKind::kLightSweep:
+      return v1::SHADOW_TECHNIQUE_LIGHT_SWEEP;
+  }
+  return v1::SHADOW_TECHNIQUE_UNSPECIFIED;
+}
+
 }  // namespace
 
 client::EncodedParticles Encoded(const ParticleSet& set) {
@@ -128,6 +140,9 @@ v1::RenderFrameRequest RequestWithoutParticles(const Scene& scene) {
   Set(scene.material, *message.mutable_material());
   v1::Shadow& shadow = *message.mutable_shadow();
   shadow.set_technique(TechniqueOf(scene.shadow.technique));
+  if (scene.shadow.technique == ShadowTechniqueKind::kLightSweep) {
+    shadow.set_fit_degree(scene.shadow.fit_degree);
+  }
   shadow.set_slices(scene.shadow.slices);
   shadow.set_interpolate(scene.shadow.interpolate);
   shadow.set_spacing(scene.shadow.spacing == SliceSpacing::kEqualCount

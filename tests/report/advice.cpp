@@ -4,8 +4,8 @@
 #include <iterator>
 #include <limits>
 
+#include "tests/measure/timing.h"
 #include "tests/report/pareto.h"
-#include "tests/report/timing.h"
 
 namespace halflight::report {
 namespace {
@@ -31,7 +31,7 @@ std::vector<Summary> Summarize(const Results& results,
     }
     if (ratios.empty()) continue;
     const double worst = *std::max_element(errors.begin(), errors.end());
-    summaries.push_back({setting, Median(ratios), worst, Median(errors), false});
+    summaries.push_back({setting, measure::Median(ratios), worst, measure::Median(errors), false});
     points.push_back({summaries.back().time_ratio, worst});
   }
   const std::vector<bool> front = ParetoFront(points);

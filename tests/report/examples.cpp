@@ -9,8 +9,8 @@
 #include "absl/strings/str_cat.h"
 #include "server/encode/image_file.h"
 #include "server/encode/srgb.h"
+#include "tests/measure/frame_error.h"
 #include "tests/report/error_map.h"
-#include "tests/report/frame_error.h"
 
 namespace halflight::report {
 namespace {
@@ -70,7 +70,7 @@ absl::StatusOr<std::string> Paint(const PixelRect& bounds, const ColorOf& color)
 }
 
 // The covered pixels of a reference as an image, the others black.
-Image ImageOf(const CoveredReference& reference) {
+Image ImageOf(const measure::CoveredReference& reference) {
   Image image{reference.pixels.width, reference.pixels.height, 1, {"R", "G", "B", "A"}, {}};
   image.pixels.resize(4 * static_cast<size_t>(image.width) * static_cast<size_t>(image.height));
   for (size_t i = 0; i < reference.pixels.pixels.size(); ++i) {
@@ -88,7 +88,7 @@ Image ImageOf(const CoveredReference& reference) {
 absl::StatusOr<Example> DrawExample(FrameRenderer& renderer, const Results& results, size_t scene,
                                     const std::vector<size_t>& settings) {
   const ReportScene& of = results.scenes[scene];
-  const CoveredReference reference = EvaluateCovered(of.scene);
+  const measure::CoveredReference reference = measure::EvaluateCovered(of.scene);
   const Image exact = ImageOf(reference);
   const PixelRect bounds = BoundsOf(reference.pixels.pixels);
   const auto paint_image = [&](const Image& image) {

@@ -2,8 +2,8 @@
 
 #include <utility>
 
+#include "tests/measure/timing.h"
 #include "tests/report/pareto.h"
-#include "tests/report/timing.h"
 
 namespace halflight::report {
 namespace {
@@ -17,22 +17,24 @@ struct Job {
 // Fills in all but the errors and the front. The baseline is among the jobs.
 absl::StatusOr<std::vector<Image>> TimeJobs(FrameRenderer& renderer, const std::vector<Job>& jobs,
                                             size_t baseline, int repeats, Results& results) {
-  std::vector<Scene> scenes;
+  std::vector<measure::Entrant> entrants;
   for (const Job& job : jobs) {
-    scenes.push_back(Apply(results.settings[job.setting], results.scenes[job.scene].scene));
+    entrants.push_back({measure::DrawWith(renderer),
+                        Apply(results.settings[job.setting], results.scenes[job.scene].scene)});
   }
-  absl::StatusOr<std::vector<TimedFrame>> frames = TimeInTurns(renderer, scenes, repeats);
-  if (!frames.ok()) return frames.status();
+  std::vector<measure::TimedFrame> frames = measure::TimeInTurns(entrants, repeats);
   std::vector<Image> images;
   for (size_t i = 0; i < jobs.size(); ++i) {
-    TimedFrame& frame = (*frames)[i];
-    results.measurements.push_back({.scene = jobs[i].scene,
-                                    .setting = jobs[i].setting,
-                                    .repeats = repeats,
-                                    .milliseconds = Median(frame.milliseconds),
-                                    .time_ratio = TimeRatio(frame, (*frames)[baseline]),
-                                    .error = {},
-                                    .on_front = false});
+    measure::TimedFrame& frame = frames[i];
+    if (!frame.status.ok()) return frame.status;
+    results.measurements.push_back(
+        {.scene = jobs[i].scene,
+         .setting = jobs[i].setting,
+         .repeats = repeats,
+         .milliseconds = measure::Median(frame.milliseconds),
+         .time_ratio = measure::MedianRatio(frame.milliseconds, frames[baseline].milliseconds),
+         .error = {},
+         .on_front = false});
     images.push_back(std::move(frame.beauty));
   }
   return images;
@@ -50,9 +52,9 @@ absl::Status MeasureMatrixScene(FrameRenderer& renderer, size_t scene, int repea
   const absl::StatusOr<std::vector<Image>> images =
       TimeJobs(renderer, jobs, baseline, repeats, results);
   if (!images.ok()) return images.status();
-  const CoveredReference reference = EvaluateCovered(results.scenes[scene].scene);
+  const measure::CoveredReference reference = measure::EvaluateCovered(results.scenes[scene].scene);
   for (size_t i = 0; i < jobs.size(); ++i) {
-    results.measurements[first + i].error = CompareAll((*images)[i], reference);
+    results.measurements[first + i].error = measure::CompareAll((*images)[i], reference);
   }
   return absl::OkStatus();
 }
@@ -80,7 +82,8 @@ absl::Status MeasureScaling(FrameRenderer& renderer, int repeats, Results& resul
       if (!made.ok()) return made.status();
       evaluator = *std::move(made);
     }
-    const absl::StatusOr<FrameError> error = CompareSample((*images)[i], *evaluator);
+    const absl::StatusOr<measure::FrameError> error =
+        measure::CompareSample((*images)[i], *evaluator);
     if (!error.ok()) return error.status();
     results.measurements[first + i].error = *error;
   }

@@ -9,7 +9,7 @@
 
 #include "absl/status/statusor.h"
 #include "renderer/frame_renderer.h"
-#include "tests/report/frame_error.h"
+#include "tests/measure/frame_error.h"
 #include "tests/report/scenes.h"
 #include "tests/report/settings.h"
 
@@ -23,7 +23,7 @@ struct Measurement {
   // To the baseline setting: of the matrix, on the same scene; of the scaling part, on its baseline
   // scene. Median of the ratios within a repeat.
   double time_ratio;
-  FrameError error;
+  measure::FrameError error;
   bool on_front;  // among the measurements of its scene
 };
 

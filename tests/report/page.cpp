@@ -6,10 +6,17 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 #include "absl/strings/str_join.h"
-#include "tests/report/markdown.h"
+#include "tests/measure/markdown.h"
 
 namespace halflight::report {
 namespace {
+
+using measure::kExact;
+using measure::Number;
+using measure::Percent;
+using measure::Row;
+using measure::Rule;
+using measure::Times;
 
 class Writer {
  public:
@@ -149,7 +156,8 @@ class Writer {
     add("GL renderer", absl::StrCat(making_.gl_renderer, "; OpenGL ", making_.gl_version));
     add("Time",
         absl::StrFormat("from request to pixels in memory, without encoding; frames drawn in turns "
-                        "after one to warm up; the median of %d ratios to the baseline in the same "
+                        "after one to warm up, each of particles never drawn before; the median of "
+                        "%d ratios to the baseline in the same "
                         "turn, of %d against the number of particles. The baseline took %.0f to "
                         "%.0f ms a frame",
                         repeats, scaling_repeats, *least, *longest));

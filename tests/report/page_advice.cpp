@@ -8,11 +8,18 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 #include "absl/strings/str_join.h"
-#include "tests/report/markdown.h"
+#include "tests/measure/markdown.h"
 #include "tests/report/page.h"
 
 namespace halflight::report {
 namespace {
+
+using measure::kExact;
+using measure::Limit;
+using measure::Percent;
+using measure::Row;
+using measure::Rule;
+using measure::Times;
 
 constexpr std::array<double, 5> kWanted = {0.4, 0.2, 0.1, 0.05, 0.02};
 

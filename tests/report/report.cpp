@@ -9,9 +9,9 @@
 
 #include "absl/strings/str_cat.h"
 #include "renderer/frame_renderer.h"
+#include "tests/measure/machine.h"
 #include "tests/report/csv.h"
 #include "tests/report/examples.h"
-#include "tests/report/machine.h"
 #include "tests/report/measure.h"
 #include "tests/report/page.h"
 #include "tests/report/plots.h"
@@ -63,12 +63,12 @@ absl::Status MakeReport(const ReportOptions& options) {
       DrawExamples(**renderer, *results, {BaselineOf(*results), Advised(*results).setting});
   if (!examples.ok()) return examples.status();
   const DeviceInfo& device = (*renderer)->device();
-  const Making making{.cpu = CpuModel(),
+  const Making making{.cpu = measure::CpuModel(),
                       .cores = std::thread::hardware_concurrency(),
                       .gl_renderer = device.gl_renderer,
                       .gl_version = device.gl_version,
                       .version = options.version,
-                      .date = Today(),
+                      .date = measure::Today(),
                       .command = options.command,
                       .short_form = options.short_form};
 

@@ -1,23 +1,18 @@
-// The report's own arithmetic: fronts, medians, replicas, advice, axes and labels.
+// The report's own arithmetic: fronts, advice, axes and labels.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <cmath>
 #include <random>
 #include <set>
 #include <string>
 #include <vector>
 
-#include <glm/geometric.hpp>
-
 #include "tests/report/advice.h"
 #include "tests/report/chart.h"
 #include "tests/report/error_map.h"
 #include "tests/report/pareto.h"
-#include "tests/report/replicate.h"
 #include "tests/report/scenes.h"
 #include "tests/report/settings.h"
-#include "tests/report/timing.h"
 
 namespace halflight::report {
 namespace {
@@ -56,74 +51,6 @@ TEST(ParetoFront, OfRandomPointsFallsAndLeavesNonePointOutsideUnbeaten) {
     }
     EXPECT_TRUE(front[i] || beaten_by_front);
   }
-}
-
-TEST(Median, IsTheMiddle) {
-  EXPECT_EQ(Median({3, 1, 2}), 2);
-  EXPECT_EQ(Median({4, 1, 3, 2}), 2.5);
-  EXPECT_EQ(Median({5}), 5);
-}
-
-TEST(TimeRatio, IsTakenWithinTurns) {
-  // The machine slows down to a third after the first turn.
-  EXPECT_EQ(TimeRatio({{}, {2, 6, 6}}, {{}, {1, 3, 3}}), 2);
-  // One turn disturbed.
-  EXPECT_EQ(TimeRatio({{}, {2, 90, 2}}, {{}, {1, 1, 1}}), 2);
-}
-
-ParticleSet Row(size_t count) {
-  ParticleSet set;
-  set.origin = {1, 2, 3};
-  for (size_t i = 0; i < count; ++i) set.positions.emplace_back(static_cast<float>(i), 0, 0);
-  return set;
-}
-
-double SumOfOpticalDepths(const Replica& replica) {
-  return -static_cast<double>(replica.particles->size()) *
-         std::log1p(-static_cast<double>(replica.opacity));
-}
-
-TEST(Replica, KeepsTheSumOfOpticalDepths) {
-  const ParticleSet source = Row(100);
-  const double expected = -100 * std::log1p(-0.18);
-  for (const size_t count : {25U, 99U, 100U, 101U, 1000U, 3333U}) {
-    const Replica replica = Replicate(source, count, 0.18F, 0.1F);
-    EXPECT_EQ(replica.particles->size(), count);
-    EXPECT_EQ(replica.particles->origin, source.origin);
-    EXPECT_NEAR(SumOfOpticalDepths(replica) / expected, 1.0, 1e-5) << count;
-  }
-}
-
-TEST(Replica, OfTheSameCountIsTheSource) {
-  const ParticleSet source = Row(50);
-  const Replica replica = Replicate(source, 50, 0.3F, 0.1F);
-  EXPECT_EQ(replica.particles->positions, source.positions);
-  EXPECT_NEAR(replica.opacity, 0.3F, 1e-6);
-}
-
-TEST(Replica, SpreadsCopiesEvenlyAndNoFartherThanTheJitter) {
-  const Replica replica = Replicate(Row(10), 70, 0.3F, 0.2F);
-  std::vector<int> copies(10);
-  double farthest = 0.0;
-  glm::dvec3 mean(0.0);
-  for (const glm::vec3& position : replica.particles->positions) {
-    const auto original = static_cast<size_t>(std::lround(position.x));
-    ++copies.at(original);
-    const glm::dvec3 moved = glm::dvec3(position) - glm::dvec3(original, 0, 0);
-    farthest = std::max(farthest, glm::length(moved));
-    mean += moved / 70.0;
-  }
-  EXPECT_THAT(copies, testing::Each(7));
-  EXPECT_LE(farthest, 0.2001);
-  EXPECT_GT(farthest, 0.1);
-  EXPECT_LT(glm::length(mean), 0.05);
-}
-
-TEST(Replica, IsTheSameEachTime) {
-  EXPECT_EQ(Replicate(Row(10), 35, 0.3F, 0.2F).particles->positions,
-            Replicate(Row(10), 35, 0.3F, 0.2F).particles->positions);
-  EXPECT_NE(Replicate(Row(10), 35, 0.3F, 0.2F, 2).particles->positions,
-            Replicate(Row(10), 35, 0.3F, 0.2F).particles->positions);
 }
 
 TEST(Settings, HaveNamesOfTheirOwnAndOneBaseline) {

@@ -11,16 +11,11 @@
 #include "absl/status/status.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
-#include "tests/oracle/plume.h"
-#include "tests/renderer/test_scene.h"
-#include "tests/report/replicate.h"
+#include "tests/measure/plume_scene.h"
+#include "tests/measure/replicate.h"
 
 namespace halflight::report {
 namespace {
-
-// What tests/data/plume/README.md says looks right.
-constexpr float kRadius = 0.045F;
-constexpr float kJitter = 0.5F * kRadius;
 
 struct NamedLight {
   const char* name;
@@ -30,13 +25,13 @@ struct NamedLight {
 
 constexpr std::array<NamedLight, 4> kLights = {{
     {"front", {-0.2, -0.3, -1.0}},
-    {"side", {1.0, -0.6, -0.6}},
+    {"side", measure::kSideLight},
     {"90 degrees", {1.0, -0.6, 0.0}, true},
     {"back", {0.3, -0.4, 1.0}},
 }};
 
 constexpr std::array<std::pair<const char*, float>, 2> kOpacities = {{
-    {"dense", 0.18F},
+    {"dense", measure::kPlumeOpacity},
     {"thin", 0.02F},
 }};
 
@@ -46,10 +41,8 @@ constexpr size_t kBaselineCount = 65'536;
 constexpr std::array<size_t, 2> kShortCounts = {1'024, 4'096};
 constexpr size_t kShortBaselineCount = 4'096;
 
-Camera PlumeCamera(int size) { return test::LookAt({0.5, 1.5, 4.6}, {0.0, 1.25, 0.0}, size, size); }
-
 glm::dvec3 Forward() {
-  return -glm::normalize(glm::dvec3(glm::row(PlumeCamera(1).view_from_world, 2)));
+  return -glm::normalize(glm::dvec3(glm::row(measure::PlumeCamera(1, 1).view_from_world, 2)));
 }
 
 glm::dvec3 DirectionOf(const std::string& name) {
@@ -61,33 +54,18 @@ glm::dvec3 DirectionOf(const std::string& name) {
   return Forward();
 }
 
-absl::StatusOr<std::shared_ptr<const ParticleSet>> LoadFrame(const SceneOptions& options,
-                                                             const std::string& frame) {
-  const std::string path = absl::StrCat(options.data_folder, "/plume/plume.", frame, ".ply");
-  std::shared_ptr<ParticleSet> set = oracle::LoadPlume(path);
-  if (set == nullptr || set->positions.empty()) {
-    return absl::NotFoundError(absl::StrCat("data: cannot read the plume in ", path));
-  }
-  return set;
+Scene LitPlume(const measure::Replica& replica, const std::string& light,
+               const SceneOptions& options) {
+  const int size = options.short_form ? 96 : 480;
+  return measure::PlumeScene(replica, DirectionOf(light), size, size);
 }
-
-Scene PlumeScene(const Replica& replica, const std::string& light, int size) {
-  Scene scene;
-  scene.particles = replica.particles;
-  scene.camera = PlumeCamera(size);
-  scene.lights = {test::Sun(DirectionOf(light))};
-  scene.material.radius = kRadius;
-  scene.material.opacity = replica.opacity;
-  return scene;
-}
-
-int SizeOf(const SceneOptions& options) { return options.short_form ? 96 : 480; }
 
 void AddMatrix(const SceneOptions& options, const std::string& frame, const ParticleSet& plume,
                std::vector<ReportScene>& scenes) {
   const size_t count = options.short_form ? kShortBaselineCount : plume.size();
   for (const auto& [opacity_name, opacity] : kOpacities) {
-    const Replica replica = Replicate(plume, count, opacity, kJitter);
+    const measure::Replica replica =
+        measure::Replicate(plume, count, opacity, measure::kPlumeJitter);
     for (const NamedLight& light : kLights) {
       if (options.short_form && light.perpendicular) continue;
       scenes.push_back({.name = absl::StrCat("plume", frame.substr(2), "-", opacity_name, "-",
@@ -96,7 +74,7 @@ void AddMatrix(const SceneOptions& options, const std::string& frame, const Part
                         .light = light.name,
                         .opacity = opacity_name,
                         .part = Part::kMatrix,
-                        .scene = PlumeScene(replica, light.name, SizeOf(options))});
+                        .scene = LitPlume(replica, light.name, options)});
     }
   }
 }
@@ -109,14 +87,15 @@ void AddScaling(const SceneOptions& options, const std::string& frame, const Par
   if (options.short_form) counts.assign(kShortCounts.begin(), kShortCounts.end());
   const size_t baseline = options.short_form ? kShortBaselineCount : kBaselineCount;
   for (const size_t count : counts) {
-    const Replica replica = Replicate(plume, count, opacity, kJitter);
+    const measure::Replica replica =
+        measure::Replicate(plume, count, opacity, measure::kPlumeJitter);
     scenes.push_back({.name = absl::StrCat("particles-", count),
                       .plume = frame,
                       .light = light,
                       .opacity = opacity_name,
                       .part = Part::kScaling,
                       .scaling_baseline = count == baseline,
-                      .scene = PlumeScene(replica, light, SizeOf(options))});
+                      .scene = LitPlume(replica, light, options)});
   }
 }
 
@@ -142,9 +121,9 @@ std::vector<std::pair<std::string, float>> Opacities() {
 }
 
 absl::StatusOr<std::vector<ReportScene>> LoadScenes(const SceneOptions& options) {
-  const auto early = LoadFrame(options, "0024");
+  const auto early = measure::LoadPlumeFrame(options.data_folder, "0024");
   if (!early.ok()) return early.status();
-  const auto late = LoadFrame(options, "0040");
+  const auto late = measure::LoadPlumeFrame(options.data_folder, "0040");
   if (!late.ok()) return late.status();
   std::vector<ReportScene> scenes;
   if (!options.short_form) AddMatrix(options, "0024", **early, scenes);

@@ -1,11 +1,11 @@
-#include "tests/report/frame_error.h"
+#include "tests/measure/frame_error.h"
 
 #include <utility>
 
 #include "renderer/error_estimate.h"
 #include "tests/oracle/image_error.h"
 
-namespace halflight::report {
+namespace halflight::measure {
 
 CoveredReference EvaluateCovered(const Scene& scene) {
   constexpr double kCovered = 0.01;
@@ -52,4 +52,4 @@ absl::StatusOr<FrameError> CompareSample(const Image& beauty,
                     .max = estimate->sample_max / estimate->reference_mean};
 }
 
-}  // namespace halflight::report
+}  // namespace halflight::measure

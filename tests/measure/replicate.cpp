@@ -1,11 +1,11 @@
-#include "tests/report/replicate.h"
+#include "tests/measure/replicate.h"
 
 #include <cmath>
 #include <random>
 
 #include <glm/geometric.hpp>
 
-namespace halflight::report {
+namespace halflight::measure {
 
 Replica Replicate(const ParticleSet& source, size_t count, float opacity, float jitter,
                   uint32_t seed) {
@@ -36,4 +36,4 @@ Replica Replicate(const ParticleSet& source, size_t count, float opacity, float 
   return {std::move(set), static_cast<float>(-std::expm1(-optical_depth))};
 }
 
-}  // namespace halflight::report
+}  // namespace halflight::measure

@@ -1,10 +1,10 @@
-#include "tests/report/markdown.h"
+#include "tests/measure/markdown.h"
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 #include "absl/strings/str_join.h"
 
-namespace halflight::report {
+namespace halflight::measure {
 
 std::string Number(double value) {
   if (value < 5e-5) return "0";
@@ -30,4 +30,4 @@ std::string Rule(size_t columns) {
   return absl::StrCat("|", absl::StrJoin(std::vector<std::string>(columns, "---"), "|"), "|\n");
 }
 
-}  // namespace halflight::report
+}  // namespace halflight::measure

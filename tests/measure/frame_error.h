@@ -8,7 +8,7 @@
 #include "renderer/scene.h"
 #include "tests/oracle/oracle.h"
 
-namespace halflight::report {
+namespace halflight::measure {
 
 // Over R, G and B, premultiplied and linear, of the covered pixels (coverage > 0.01), all divided
 // by the reference's mean over the same pixels.
@@ -35,4 +35,4 @@ FrameError CompareAll(const Image& beauty, const CoveredReference& reference);
 absl::StatusOr<FrameError> CompareSample(const Image& beauty,
                                          const reference::Evaluator& evaluator);
 
-}  // namespace halflight::report
+}  // namespace halflight::measure

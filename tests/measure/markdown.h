@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-namespace halflight::report {
+namespace halflight::measure {
 
 // A part as percents with two digits, without and with the sign. What is rounding alone is 0.
 std::string Number(double value);
@@ -22,4 +22,4 @@ std::string Times(double ratio);
 std::string Row(const std::vector<std::string>& cells);
 std::string Rule(size_t columns);
 
-}  // namespace halflight::report
+}  // namespace halflight::measure

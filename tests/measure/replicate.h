@@ -8,7 +8,7 @@
 
 #include "renderer/scene.h"
 
-namespace halflight::report {
+namespace halflight::measure {
 
 // `count` particles at the places of `source`: every so-manieth of them where there are more,
 // copies of each where there are fewer. The first copy stands where its original does, the others
@@ -22,4 +22,4 @@ struct Replica {
 Replica Replicate(const ParticleSet& source, size_t count, float opacity, float jitter,
                   uint32_t seed = 1);
 
-}  // namespace halflight::report
+}  // namespace halflight::measure

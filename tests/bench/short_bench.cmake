@@ -1,0 +1,56 @@
+# Runs the short form of PROGRAM in FOLDER, and checks that its page and its figures are whole.
+# Judges no figure: its frames are small and few.
+file(REMOVE_RECURSE ${FOLDER})
+execute_process(
+  COMMAND ${PROGRAM} --short --data ${DATA} --page ${FOLDER}/page.md --figures ${FOLDER}/figures.json
+  COMMAND_ERROR_IS_FATAL ANY)
+file(READ ${FOLDER}/page.md page)
+file(READ ${FOLDER}/figures.json figures)
+
+function(expect_on_page text)
+  string(FIND "${page}" "${text}" at)
+  if(at EQUAL -1)
+    message(SEND_ERROR "the page lacks: ${text}")
+  endif()
+endfunction()
+
+foreach(title "Goals" "One frame" "Where the time goes" "Against the number of particles"
+        "Against slices" "Against resolution" "Turntable" "Service" "How this page was made")
+  expect_on_page("## ${title}\n")
+endforeach()
+expect_on_page("**Short form")
+
+# Every row has its turns; those of one frame an error and stages too, and a line on the page.
+function(expect_rows part)
+  string(JSON count LENGTH "${figures}" ${part})
+  if(count EQUAL 0)
+    message(SEND_ERROR "figures: ${part} is empty")
+    return()
+  endif()
+  math(EXPR last "${count} - 1")
+  foreach(i RANGE ${last})
+    string(JSON turns LENGTH "${figures}" ${part} ${i} milliseconds)
+    if(turns EQUAL 0)
+      message(SEND_ERROR "figures: ${part} ${i} has no turns")
+    endif()
+    string(JSON name GET "${figures}" ${part} ${i} name)
+    if(NOT part STREQUAL "slices")
+      expect_on_page("| ${name} |")
+    endif()
+    if(part STREQUAL "frame")
+      string(JSON error GET "${figures}" ${part} ${i} relative_error rmse)
+      string(JSON stage GET "${figures}" ${part} ${i} stages 0 stage)
+    endif()
+  endforeach()
+endfunction()
+
+foreach(part frame slices turntable)
+  expect_rows(${part})
+endforeach()
+if(SERVICE)
+  expect_rows(service)
+endif()
+string(JSON goals LENGTH "${figures}" goals)
+if(goals LESS 4)
+  message(SEND_ERROR "figures: ${goals} goals")
+endif()
