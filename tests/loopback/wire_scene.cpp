@@ -95,18 +95,6 @@ void Set(const Material& from, v1::Material& to) {
   }
 }
 
-v1::ShadowTechnique TechniqueOf(ShadowTechniqueKind technique) {
-  switch (technique) {
-    case ShadowTechniqueKind::kHalfAngle:
-      return v1::SHADOW_TECHNIQUE_HALF_ANGLE;
-    case ShadowTechniqueKind::kReference:
-      return v1::SHADOW_TECHNIQUE_REFERENCE;
-    case ShadowTechniqueKind::kLightSweep:
-      return v1::SHADOW_TECHNIQUE_LIGHT_SWEEP;
-  }
-  return v1::SHADOW_TECHNIQUE_UNSPECIFIED;
-}
-
 }  // namespace
 
 client::EncodedParticles Encoded(const ParticleSet& set) {
