@@ -10,7 +10,6 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
-#include "halflight/sha256.h"
 #include "server/convert/describe.h"
 #include "server/convert/field_checks.h"
 #include "server/frame_log.h"
@@ -58,7 +57,6 @@ struct FramePipeline::Flight {
   std::mutex mutex;
   std::atomic<size_t> outputs_left = 0;
   std::vector<EncodedImage> encoded;
-  std::vector<std::string> digests;
 };
 
 FramePipeline::FramePipeline(FrameEngine& engine, PipelineOptions options)
@@ -241,7 +239,6 @@ void FramePipeline::Encode(const FlightPtr& flight) {
   flight->encode_begin = Clock::now();
   const size_t outputs = flight->job.outputs.size();
   flight->encoded.resize(outputs);
-  flight->digests.resize(outputs);
   flight->outputs_left = outputs;
   for (size_t i = 0; i < outputs; ++i) {
     workers_.Post([this, flight, i] { EncodeOutput(flight, i); });
@@ -258,7 +255,6 @@ void FramePipeline::EncodeOutput(const FlightPtr& flight, size_t index) {
                                             options_.server_version));
   }
   if (encoded.ok()) {
-    flight->digests[index] = Sha256Of(encoded->bytes);
     flight->encoded[index] = *std::move(encoded);
   } else {
     const std::lock_guard lock(flight->mutex);
@@ -289,9 +285,8 @@ void FramePipeline::Complete(const FlightPtr& flight) {
     auto frame = std::make_shared<EncodedFrame>();
     frame->header = DescribeFrame(flight->job, flight->frame, flight->encoded, engine_.device(),
                                   options_.server_version);
-    for (size_t i = 0; i < flight->encoded.size(); ++i) {
-      frame->outputs.push_back(std::move(flight->encoded[i].bytes));
-      frame->trailer.add_output_sha256(flight->digests[i]);
+    for (EncodedImage& encoded : flight->encoded) {
+      frame->outputs.push_back(std::move(encoded.bytes));
     }
     answer = std::shared_ptr<const EncodedFrame>(std::move(frame));
   } else {

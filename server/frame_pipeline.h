@@ -1,5 +1,5 @@
 // A frame's way through the server: rendered on the engine's thread, its error measured where that
-// is asked for and its outputs encoded and hashed on others, and handed over complete. A frame with
+// is asked for and its outputs encoded on others, and handed over complete. A frame with
 // a target is rendered and measured as often as its search wants. Does not send anything and knows
 // no clients.
 #pragma once
@@ -26,11 +26,10 @@
 
 namespace halflight {
 
-// A finished frame as it is sent.
+// A finished frame as it is sent, but for the digests in its trailer: they are made while sending.
 struct EncodedFrame {
   v1::FrameHeader header;
   std::vector<std::string> outputs;  // bytes, in the request's order
-  v1::FrameTrailer trailer;
 };
 
 struct PipelineOptions {
