@@ -43,7 +43,7 @@ struct PipelineOptions {
   // What holds a beauty against the image model; one thread of the pipeline, one frame at a time.
   std::function<absl::StatusOr<FrameError>(const Image&, const Scene&, const MeasureJob&,
                                            const std::stop_token&)>
-      measure = MeasureFrame;
+      measure = FrameMeasurer();
 };
 
 class FramePipeline {
