@@ -24,9 +24,11 @@ absl::StatusOr<LightFit> FitLight(const Light& light, const ParticleView& partic
 
   // Sweep every tile through its particles.
   const auto terms = static_cast<size_t>(Terms(degree));
-  std::vector<float> moments(tiles.entries.size() * 2 * terms);
+  Block<float> moments(tiles.entries.size() * 2 * terms);
   const TargetShape shape{fit.projection.orthographic, profile == Profile::kBall};
-  const bool done = ForTiles(tiles.begin.size() - 1, stop, [&](size_t tile) {
+  const std::vector<uint32_t> longest_first = LongestFirst(tiles);
+  const bool done = ForTiles(longest_first.size(), stop, [&](size_t turn) {
+    const size_t tile = longest_first[turn];
     const int x = static_cast<int>(tile % tiles.tiles.x) * kLightTile;
     const int y = static_cast<int>(tile / tiles.tiles.x) * kLightTile;
     std::vector<LightEntry> entries;

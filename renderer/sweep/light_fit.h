@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
+#include "renderer/block_cache.h"
 #include "renderer/image.h"
 #include "renderer/particle_view.h"
 #include "renderer/projection.h"
@@ -18,9 +19,9 @@ struct LightFit {
   int degree = 0;
   // By particle, Terms(degree) coefficients: the optical depth that the light met before it, as a
   // polynomial in the scaled coordinates of `sprites`.
-  std::vector<float> depth;
-  std::vector<Sprite> sprites;  // by particle
-  Image optical_depth;          // behind all particles; Y
+  Block<float> depth;
+  Block<Sprite> sprites;  // by particle
+  Image optical_depth;    // behind all particles; Y
 };
 
 // `degree` 0 to kMaxDegree. Deposits the particles nearest the light first, each as the light

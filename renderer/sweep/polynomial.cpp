@@ -1,6 +1,7 @@
 #include "renderer/sweep/polynomial.h"
 
 #include <cmath>
+#include <iterator>
 #include <utility>
 
 namespace halflight::sweep {
@@ -50,29 +51,42 @@ std::vector<double> Inverse(std::vector<double> m, int n) {
   return inverse;
 }
 
+// Every homogeneous part by Horner's scheme in u: coefficients of x^i y^(k - i), power of x by
+// power.
+template <int kDegree>
+void SubstituteAt(const float* p, const glm::dvec2& of_x, const glm::dvec2& of_y, double factor,
+                  float* q) {
+  const auto times = [](auto& r, int degree, double x, double y) {
+    r[degree + 1] = r[degree] * x;
+    for (int i = degree; i > 0; --i) r[i] = r[i] * y + r[i - 1] * x;
+    r[0] *= y;
+  };
+  double v_powers[kDegree + 1][kDegree + 1] = {{1.0}};
+  for (int k = 0; k < kDegree; ++k) {
+    for (int i = 0; i <= k; ++i) v_powers[k + 1][i] = v_powers[k][i];
+    times(v_powers[k + 1], k, of_x.y, of_y.y);
+  }
+  for (int n = 0; n <= kDegree; ++n) {
+    double r[kDegree + 2] = {factor * p[TermIndex(kDegree, n, 0)]};
+    for (int k = 1; k <= n; ++k) {
+      times(r, k - 1, of_x.x, of_y.x);
+      const double coefficient = factor * p[TermIndex(kDegree, n - k, k)];
+      for (int i = 0; i <= k; ++i) r[i] += coefficient * v_powers[k][i];
+    }
+    for (int i = 0; i <= n; ++i) q[TermIndex(kDegree, i, n - i)] = static_cast<float>(r[i]);
+  }
+}
+
 }  // namespace
 
 void Substitute(int degree, std::span<const float> p, const glm::dvec2& of_x,
                 const glm::dvec2& of_y, double factor, std::span<float> q) {
-  std::array<double, Terms(kMaxDegree)> sum = {};
-  // Coefficients of x^i y^(n - i) in u^a v^b, n = a + b, built up factor by factor.
-  std::array<double, kMaxDegree + 1> u_power = {1.0};
-  for (int a = 0; a <= degree; ++a) {
-    std::array<double, kMaxDegree + 1> product = u_power;
-    for (int b = 0; a + b <= degree; ++b) {
-      const double coefficient = factor * p[TermIndex(degree, a, b)];
-      for (int i = 0; i <= a + b; ++i) {
-        sum[TermIndex(degree, i, a + b - i)] += coefficient * product[i];
-      }
-      for (int i = kMaxDegree; i >= 0; --i) {
-        product[i] = product[i] * of_y.y + (i > 0 ? product[i - 1] * of_x.y : 0.0);
-      }
-    }
-    for (int i = kMaxDegree; i >= 0; --i) {
-      u_power[i] = u_power[i] * of_y.x + (i > 0 ? u_power[i - 1] * of_x.x : 0.0);
-    }
-  }
-  for (int i = 0; i < Terms(degree); ++i) q[i] = static_cast<float>(sum[i]);
+  constexpr void (*kByDegree[])(const float*, const glm::dvec2&, const glm::dvec2&, double,
+                                float*) = {SubstituteAt<0>, SubstituteAt<1>, SubstituteAt<2>,
+                                           SubstituteAt<3>, SubstituteAt<4>, SubstituteAt<5>,
+                                           SubstituteAt<6>};
+  static_assert(std::size(kByDegree) == kMaxDegree + 1);
+  kByDegree[degree](p.data(), of_x, of_y, factor, q.data());
 }
 
 DiscFit::DiscFit(Profile profile, int degree) : terms_(Terms(degree)) {
@@ -87,7 +101,16 @@ DiscFit::DiscFit(Profile profile, int degree) : terms_(Terms(degree)) {
                                                  powers[i].second + powers[j].second);
     }
   }
-  inverse_gram_ = Inverse(std::move(gram), terms_);
+  // Monomials of unlike parity have no product, and none in the inverse.
+  const std::vector<double> inverse = Inverse(std::move(gram), terms_);
+  for (size_t i = 0; i < powers.size(); ++i) {
+    for (size_t j = 0; j < powers.size(); ++j) {
+      if ((powers[i].first - powers[j].first) % 2 != 0) continue;
+      if ((powers[i].second - powers[j].second) % 2 != 0) continue;
+      inverse_gram_.push_back({static_cast<uint8_t>(j), inverse[i * powers.size() + j]});
+    }
+    row_end_[i] = inverse_gram_.size();
+  }
 }
 
 void DiscFit::Fit(std::span<const float> weights, std::span<const float> values,
@@ -96,9 +119,12 @@ void DiscFit::Fit(std::span<const float> weights, std::span<const float> values,
   const double inverse = weights[0] > 0.0F ? 1.0 / weights[0] : 0.0;
   const double mean = values[0] * inverse;
   for (int i = 0; i < terms_; ++i) centered[i] = (values[i] - mean * weights[i]) * inverse;
+  size_t entry = 0;
   for (int i = 0; i < terms_; ++i) {
     double coefficient = i == 0 ? mean : 0.0;
-    for (int j = 0; j < terms_; ++j) coefficient += inverse_gram_[i * terms_ + j] * centered[j];
+    for (; entry < row_end_[i]; ++entry) {
+      coefficient += inverse_gram_[entry].value * centered[inverse_gram_[entry].column];
+    }
     polynomial[i] = static_cast<float>(coefficient);
   }
 }

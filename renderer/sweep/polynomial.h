@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <span>
 #include <vector>
 
@@ -31,8 +32,14 @@ class DiscFit {
            std::span<float> polynomial) const;
 
  private:
+  struct Entry {
+    uint8_t column;
+    double value;
+  };
+
   int terms_;
-  std::vector<double> inverse_gram_;  // terms_ by terms_
+  std::vector<Entry> inverse_gram_;  // what is not 0, row by row
+  std::array<size_t, Terms(kMaxDegree)> row_end_ = {};
 };
 
 }  // namespace halflight::sweep

@@ -283,6 +283,8 @@ Shading ShadeSprites(const Scene& scene, const ParticleView& particles, const Pr
                   degree, depth, {glm::dot(axes.x, footprint.x), glm::dot(axes.y, footprint.x)},
                   {glm::dot(axes.x, footprint.y), glm::dot(axes.y, footprint.y)}, density, out);
             }
+          } else {
+            std::fill(out.begin(), out.end(), 0.0F);
           }
           for (size_t t = 0; t < terms; ++t) out[t] += varying[t];
         }

@@ -28,11 +28,11 @@ struct Shading {
   int degree = 0;
   int exponents = 1;
   std::array<bool, kMaxTileLights> shadow_alone = {};
-  std::vector<uint16_t> rows;
-  std::vector<Rgb> unshadowed;
-  std::vector<float> depth;
-  std::vector<Rgb> lit;
-  std::vector<float> exponent;
+  Block<uint16_t> rows;
+  Block<Rgb> unshadowed;
+  Block<float> depth;
+  Block<Rgb> lit;
+  Block<float> exponent;
   std::vector<NearLight> near_lights;
 
   [[nodiscard]] ShadedSprites View(const SpriteList& list) const;

@@ -57,7 +57,7 @@ SpriteList ListSprites(const ParticleView& particles, const Projection& target, 
   };
 
   // Sort by depth.
-  std::vector<uint32_t> keys(count);
+  Block<uint32_t> keys(count);
   std::atomic<bool> has_near = false;
   ParallelRanges(count, [&](const WorkRange& range) {
     for (size_t i = range.begin; i < range.end; ++i) {

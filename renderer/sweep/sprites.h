@@ -13,8 +13,8 @@ namespace halflight::sweep {
 
 struct SpriteList {
   std::vector<uint32_t> particles;  // nearest the eye or the light first; equal depths by index
-  std::vector<Sprite> sprites;      // of those, as the next
-  std::vector<Rect> rects;          // pixels that may lie within
+  Block<Sprite> sprites;      // of those, as the next
+  Block<Rect> rects;          // pixels that may lie within
   // Centres in radii of those near a perspective target's eye, whose scale is 0; empty where there
   // are none.
   std::vector<NearSprite> near;

@@ -1,5 +1,8 @@
 #include "renderer/sweep/tiles.h"
 
+#include <algorithm>
+#include <numeric>
+
 #include "renderer/parallel.h"
 
 namespace halflight::sweep {
@@ -32,7 +35,16 @@ void ForTilesOf(const Rect& rect, int tile_size, int tiles_across, const Visit& 
 
 }  // namespace
 
-TileLists ListTiles(const std::vector<Rect>& rects, const glm::ivec2& target_size, int tile_size) {
+std::vector<uint32_t> LongestFirst(const TileLists& lists) {
+  std::vector<uint32_t> tiles(lists.begin.size() - 1);
+  std::iota(tiles.begin(), tiles.end(), 0U);
+  const auto length = [&](uint32_t tile) { return lists.begin[tile + 1] - lists.begin[tile]; };
+  std::stable_sort(tiles.begin(), tiles.end(),
+                   [&](uint32_t a, uint32_t b) { return length(a) > length(b); });
+  return tiles;
+}
+
+TileLists ListTiles(const Block<Rect>& rects, const glm::ivec2& target_size, int tile_size) {
   TileLists lists;
   lists.tiles = (target_size + (tile_size - 1)) / tile_size;
   const auto tile_count = static_cast<size_t>(lists.tiles.x) * lists.tiles.y;

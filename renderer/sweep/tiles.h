@@ -7,6 +7,8 @@
 
 #include <glm/vec2.hpp>
 
+#include "renderer/block_cache.h"
+
 namespace halflight::sweep {
 
 // Pixels [x_begin, x_end) by [y_begin, y_end) of a target; empty where a particle is not seen.
@@ -29,12 +31,15 @@ struct TileLists {
   glm::ivec2 tiles{0};
   // Tile t (row by row) has entries [begin[t], begin[t + 1]), by ascending item.
   std::vector<size_t> begin;
-  std::vector<TileEntry> entries;
+  Block<TileEntry> entries;
   // Item i has the parts [part_begin[i], part_begin[i + 1]).
-  std::vector<uint32_t> part_begin;
+  Block<uint32_t> part_begin;
 };
 
+// The tiles, those with the most entries first: where there are few, the cores end together.
+std::vector<uint32_t> LongestFirst(const TileLists& lists);
+
 // Uses all cores. Targets of at most 65535 pixels along a side.
-TileLists ListTiles(const std::vector<Rect>& rects, const glm::ivec2& target_size, int tile_size);
+TileLists ListTiles(const Block<Rect>& rects, const glm::ivec2& target_size, int tile_size);
 
 }  // namespace halflight::sweep

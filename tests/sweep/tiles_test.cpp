@@ -9,9 +9,9 @@
 namespace halflight::sweep {
 namespace {
 
-std::vector<Rect> RandomRects(size_t count, const glm::ivec2& size) {
+Block<Rect> RandomRects(size_t count, const glm::ivec2& size) {
   std::mt19937 random(7);
-  std::vector<Rect> rects(count);
+  Block<Rect> rects(count);
   for (Rect& rect : rects) {
     const auto x = static_cast<int>(random() % static_cast<unsigned>(size.x));
     const auto y = static_cast<int>(random() % static_cast<unsigned>(size.y));
@@ -28,7 +28,7 @@ std::vector<Rect> RandomRects(size_t count, const glm::ivec2& size) {
 TEST(ListTiles, HasEveryTouchedTileOnceInOrder) {
   const glm::ivec2 size(101, 67);
   constexpr int kTile = 8;
-  const std::vector<Rect> rects = RandomRects(40000, size);
+  const Block<Rect> rects = RandomRects(40000, size);
   const TileLists lists = ListTiles(rects, size, kTile);
   ASSERT_EQ(lists.tiles, glm::ivec2(13, 9));
   std::vector<uint32_t> parts_of(rects.size(), 0);

@@ -1,0 +1,131 @@
+#include "renderer/block_cache.h"
+
+#include <sys/mman.h>
+
+#include <algorithm>
+#include <bit>
+#include <cstdlib>
+#include <mutex>
+
+namespace halflight {
+
+namespace {
+
+constexpr size_t kCacheLine = 64;
+constexpr size_t kHugePage = size_t{2} << 20U;
+
+struct Idle {
+  void* block;
+  size_t bytes;
+};
+
+struct Cache {
+  std::mutex mutex;
+  std::vector<Idle> idle;  // guarded by mutex, as the rest; idle longest first
+  size_t bytes = 0;
+  size_t limit = size_t{1} << 30U;
+};
+
+// Never destroyed: arrays of static storage may be freed later.
+Cache& TheCache() {
+  static Cache& cache = *new Cache;
+  return cache;
+}
+
+// Eight sizes from each power of two to the next.
+size_t RoundedUp(size_t bytes) {
+  const size_t step = std::bit_floor(bytes) / 8;
+  return (bytes + step - 1) / step * step;
+}
+
+void* NewBlock(size_t bytes) {
+  const bool huge = bytes >= 2 * kHugePage;
+  const size_t alignment = huge ? kHugePage : kCacheLine;
+  void* const block =
+      std::aligned_alloc(alignment, (bytes + alignment - 1) / alignment * alignment);
+  if (block == nullptr) throw std::bad_alloc();
+  // A hint: where the system has no huge pages, small ones serve.
+  if (huge) madvise(block, bytes, MADV_HUGEPAGE);
+  return block;
+}
+
+// Takes those idle longest until at most `limit` bytes are left.
+std::vector<Idle> TakeDownTo(size_t limit, Cache& cache) {
+  size_t count = 0;
+  for (; cache.bytes > limit; ++count) cache.bytes -= cache.idle[count].bytes;
+  const auto end = cache.idle.begin() + static_cast<ptrdiff_t>(count);
+  std::vector<Idle> taken(cache.idle.begin(), end);
+  cache.idle.erase(cache.idle.begin(), end);
+  return taken;
+}
+
+void FreeAll(const std::vector<Idle>& blocks) {
+  for (const Idle& idle : blocks) std::free(idle.block);
+}
+
+}  // namespace
+
+void BlockCache::SetLimit(size_t bytes) {
+  std::vector<Idle> taken;
+  {
+    Cache& cache = TheCache();
+    const std::lock_guard lock(cache.mutex);
+    cache.limit = bytes;
+    taken = TakeDownTo(bytes, cache);
+  }
+  FreeAll(taken);
+}
+
+void BlockCache::Release() {
+  std::vector<Idle> taken;
+  {
+    Cache& cache = TheCache();
+    const std::lock_guard lock(cache.mutex);
+    taken = TakeDownTo(0, cache);
+  }
+  FreeAll(taken);
+}
+
+size_t BlockCache::idle_bytes() {
+  Cache& cache = TheCache();
+  const std::lock_guard lock(cache.mutex);
+  return cache.bytes;
+}
+
+void* BlockCache::Allocate(size_t bytes) {
+  if (bytes < kLeastBytes) return ::operator new(bytes);
+  bytes = RoundedUp(bytes);
+  {
+    Cache& cache = TheCache();
+    const std::lock_guard lock(cache.mutex);
+    // The one freed last: it is the likeliest to be in the processor's caches.
+    const auto found = std::find_if(cache.idle.rbegin(), cache.idle.rend(),
+                                    [bytes](const Idle& idle) { return idle.bytes == bytes; });
+    if (found != cache.idle.rend()) {
+      void* const block = found->block;
+      cache.bytes -= bytes;
+      cache.idle.erase(std::next(found).base());
+      return block;
+    }
+  }
+  return NewBlock(bytes);
+}
+
+void BlockCache::Free(void* block, size_t bytes) noexcept {
+  if (bytes < kLeastBytes) {
+    ::operator delete(block);
+    return;
+  }
+  bytes = RoundedUp(bytes);
+  std::vector<Idle> taken;
+  {
+    Cache& cache = TheCache();
+    const std::lock_guard lock(cache.mutex);
+    cache.idle.push_back({block, bytes});
+    cache.bytes += bytes;
+    taken = TakeDownTo(cache.limit, cache);
+  }
+  FreeAll(taken);
+}
+
+}  // namespace halflight
