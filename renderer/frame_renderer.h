@@ -1,6 +1,7 @@
 // Renders frames on one GL context: start reading here.
 #pragma once
 
+#include <cstddef>
 #include <memory>
 #include <stop_token>
 #include <string>
@@ -25,6 +26,8 @@ class FrameRenderer {
   absl::StatusOr<FrameResult> Render(const FrameRequest& request, const std::stop_token& stop);
 
   [[nodiscard]] const DeviceInfo& device() const { return context_->device(); }
+  // How many programs frames have needed so far.
+  [[nodiscard]] size_t programs_built() const { return gpu_.programs.size(); }
 
  private:
   explicit FrameRenderer(std::unique_ptr<gl::EglContext> context) : context_(std::move(context)) {}

@@ -60,11 +60,23 @@ struct FramePipeline::Flight {
 };
 
 FramePipeline::FramePipeline(FrameEngine& engine, PipelineOptions options)
-    : engine_(engine), options_(std::move(options)), workers_(options_.encode_threads) {}
+    : engine_(engine), options_(std::move(options)), workers_(options_.encode_threads) {
+  if (options_.warm_up) {
+    workers_.Post([this] { WarmUp(); });
+  }
+}
 
 FramePipeline::~FramePipeline() {
   std::unique_lock lock(mutex_);
   idle_.wait(lock, [this] { return flights_ == 0; });
+}
+
+void FramePipeline::WarmUp() {
+  const Image image{16, 16, 1, {"R", "G", "B", "A"}, std::vector<float>(size_t{16} * 16 * 4, 0.5F)};
+  for (const ImageFormat format : {ImageFormat::kPng8, ImageFormat::kExrHalf}) {
+    // A frame that needs the format says what is wrong with it.
+    options_.encode(image, ImageKind::kBeauty, {}, {format}, {}).IgnoreError();
+  }
 }
 
 absl::Status FramePipeline::Admit() {

@@ -35,6 +35,9 @@ struct EncodedFrame {
 struct PipelineOptions {
   uint32_t max_queued_frames = 64;  // accepted and not yet encoded
   int encode_threads = 1;
+  // Whether to encode a small image of each kind of file at once, so that the first frame does not
+  // wait for what the image library does the first time.
+  bool warm_up = false;
   std::string server_version = "unknown";
   // What makes bytes of pixels; any thread.
   std::function<absl::StatusOr<EncodedImage>(const Image&, ImageKind, LightQuantity,
@@ -88,6 +91,7 @@ class FramePipeline {
   void Complete(const FlightPtr& flight);
 
   void Fail(const FlightPtr& flight, absl::Status status);
+  void WarmUp();
 
   FrameEngine& engine_;
   const PipelineOptions options_;

@@ -77,7 +77,8 @@ int Fail(int code, const absl::Status& status) {
 int Run(const Options& options, const sigset_t& signals) {
   auto engine =
       StartRenderThread({.device = options.device,
-                         .max_queued_frames = static_cast<int>(options.limits.max_queued_frames)});
+                         .max_queued_frames = static_cast<int>(options.limits.max_queued_frames),
+                         .warm_up = true});
   if (!engine.ok()) {
     return Fail(kExitCannotStart, engine.status());
   }
@@ -92,6 +93,7 @@ int Run(const Options& options, const sigset_t& signals) {
   ByteBudget upload_memory(limits.max_cache_bytes);
   FramePipeline pipeline(**engine, {.max_queued_frames = limits.max_queued_frames,
                                     .encode_threads = options.encode_threads,
+                                    .warm_up = true,
                                     .server_version = version});
   auto server = GrpcServer::Start(options.addresses,
                                   {device, limits, version, store, upload_memory, pipeline});
