@@ -1,6 +1,6 @@
 // A finished frame cut into the messages it is sent as: header, chunks of every output, trailer.
-// Copies and hashes one chunk at a time, so that the peer receives and checks one chunk while the
-// next is made ready; sends nothing.
+// Copies and checksums one chunk at a time, so that the peer receives and checks one chunk while
+// the next is made ready; sends nothing.
 #pragma once
 
 #include <cstddef>
@@ -10,7 +10,7 @@
 #include <string_view>
 #include <utility>
 
-#include "halflight/sha256.h"
+#include "halflight/crc32c.h"
 #include "server/frame_pipeline.h"
 
 namespace halflight {
@@ -39,7 +39,7 @@ class FrameMessages {
         chunk.set_output_index(static_cast<uint32_t>(output_));
         chunk.set_offset(offset_);
         chunk.set_data(data.data(), data.size());
-        sha_.Update(data);
+        crc32c_ = ExtendCrc32c(crc32c_, data);
         offset_ += data.size();
         SealComplete();
         return true;
@@ -57,11 +57,11 @@ class FrameMessages {
  private:
   enum class Part : uint8_t { kHeader, kChunk, kTrailer, kEnd };
 
-  // Digests the outputs of which all is sent, up to the next byte to send, or to the trailer where
+  // Seals the outputs of which all is sent, up to the next byte to send, or to the trailer where
   // there is none.
   void SealComplete() {
     while (output_ < frame_->outputs.size() && offset_ == frame_->outputs[output_].size()) {
-      trailer_.add_output_sha256(std::exchange(sha_, Sha256()).Finish());
+      trailer_.add_output_crc32c(std::exchange(crc32c_, 0));
       ++output_;
       offset_ = 0;
     }
@@ -74,7 +74,7 @@ class FrameMessages {
   Part next_ = Part::kHeader;
   size_t output_ = 0;
   size_t offset_ = 0;
-  Sha256 sha_;  // of the output that is being sent
+  uint32_t crc32c_ = 0;  // of the output that is being sent
   v1::FrameTrailer trailer_;
 };
 
