@@ -26,7 +26,8 @@
 
 namespace halflight {
 
-// A finished frame as it is sent, but for the checksums in its trailer: they are made while sending.
+// A finished frame as it is sent, but for the checksums in its trailer: they are made while
+// sending.
 struct EncodedFrame {
   v1::FrameHeader header;
   std::vector<std::string> outputs;  // bytes, in the request's order

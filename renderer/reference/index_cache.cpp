@@ -66,7 +66,7 @@ template <typename T, typename Make, typename BytesOf>
 std::shared_ptr<const T> IndexCache::FindOrMake(const Key& key, const std::stop_token& stop,
                                                 const Make& make, const BytesOf& bytes_of) {
   if (auto found = Find(key)) return std::static_pointer_cast<const T>(found);
-  const std::shared_ptr<const T> made = make();
+  std::shared_ptr<const T> made = make();
   if (!stop.stop_requested()) Keep({key, made, bytes_of(*made)});
   return made;
 }

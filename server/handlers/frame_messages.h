@@ -33,8 +33,8 @@ class FrameMessages {
         SealComplete();
         return true;
       case Part::kChunk: {
-        const std::string& bytes = frame_->outputs[output_];
-        const std::string_view data = std::string_view(bytes).substr(offset_, kChunkBytes);
+        const std::string_view bytes = frame_->outputs[output_];
+        const std::string_view data = bytes.substr(offset_, kChunkBytes);
         v1::OutputChunk& chunk = *message.mutable_chunk();
         chunk.set_output_index(static_cast<uint32_t>(output_));
         chunk.set_offset(offset_);
