@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "halflight/crc32c.h"
+
 namespace halflight::client {
 
 namespace {
@@ -25,16 +27,16 @@ absl::Status FrameAssembler::AddHeader(const v1::FrameHeader& header) {
 }
 
 void FrameAssembler::SealComplete() {
-  while (frame_.sha256.size() < static_cast<size_t>(frame_.header.outputs_size())) {
-    const uint64_t size = frame_.header.outputs(static_cast<int>(frame_.sha256.size())).byte_size();
-    if (frame_.outputs.size() == frame_.sha256.size()) {
+  while (complete_.size() < static_cast<size_t>(frame_.header.outputs_size())) {
+    const uint64_t size = frame_.header.outputs(static_cast<int>(complete_.size())).byte_size();
+    if (frame_.outputs.size() == complete_.size()) {
       frame_.outputs.emplace_back();
       frame_.outputs.back().reserve(std::min(size, kMostReserved));
     }
     if (frame_.outputs.back().size() < size) {
       return;
     }
-    frame_.sha256.push_back(std::exchange(sha_, Sha256()).Finish());
+    complete_.push_back(std::exchange(crc32c_, 0));
   }
 }
 
@@ -42,7 +44,7 @@ absl::Status FrameAssembler::AddChunk(const v1::OutputChunk& chunk) {
   if (!started_) {
     return absl::DataLossError("a chunk came before the frame's header");
   }
-  const size_t current = frame_.sha256.size();
+  const size_t current = complete_.size();
   if (chunk.output_index() != current ||
       current == static_cast<size_t>(frame_.header.outputs_size())) {
     return absl::DataLossError(
@@ -57,7 +59,7 @@ absl::Status FrameAssembler::AddChunk(const v1::OutputChunk& chunk) {
         current, chunk.data().size(), chunk.offset(), output.size(), size));
   }
   output += chunk.data();
-  sha_.Update(chunk.data());
+  crc32c_ = ExtendCrc32c(crc32c_, chunk.data());
   SealComplete();
   return absl::OkStatus();
 }
@@ -67,22 +69,22 @@ absl::Status FrameAssembler::AddTrailer(const v1::FrameTrailer& trailer) {
     return absl::DataLossError("a trailer came before the frame's header");
   }
   const auto outputs = static_cast<size_t>(frame_.header.outputs_size());
-  if (frame_.sha256.size() != outputs) {
-    const size_t current = frame_.sha256.size();
+  if (complete_.size() != outputs) {
+    const size_t current = complete_.size();
     return absl::DataLossError(
         fmt::format("output {}: {} of {} bytes came before the trailer", current,
                     frame_.outputs[current].size(),
                     frame_.header.outputs(static_cast<int>(current)).byte_size()));
   }
-  if (static_cast<size_t>(trailer.output_sha256_size()) != outputs) {
-    return absl::DataLossError(fmt::format("the trailer has {} digests, expected {}",
-                                           trailer.output_sha256_size(), outputs));
+  if (static_cast<size_t>(trailer.output_crc32c_size()) != outputs) {
+    return absl::DataLossError(fmt::format("the trailer has {} checksums, expected {}",
+                                           trailer.output_crc32c_size(), outputs));
   }
   for (size_t i = 0; i < outputs; ++i) {
-    const std::string& promised = trailer.output_sha256(static_cast<int>(i));
-    if (promised != frame_.sha256[i]) {
-      return absl::DataLossError(fmt::format("output {}: SHA-256 of the bytes is {}, expected {}",
-                                             i, ToHex(frame_.sha256[i]), ToHex(promised)));
+    const uint32_t promised = trailer.output_crc32c(static_cast<int>(i));
+    if (promised != complete_[i]) {
+      return absl::DataLossError(fmt::format(
+          "output {}: CRC-32C of the bytes is {:08x}, expected {:08x}", i, complete_[i], promised));
     }
   }
   return absl::OkStatus();

@@ -1,13 +1,12 @@
 // Puts a frame together from the messages it arrives in, and believes none of them: order, offsets,
-// sizes and digests are checked. Knows nothing of how messages arrive.
+// sizes and checksums are checked. Knows nothing of how messages arrive.
 #pragma once
 
-#include <optional>
+#include <cstdint>
 #include <string>
 #include <vector>
 
 #include "absl/status/status.h"
-#include "halflight/sha256.h"
 #include "halflight/v1/frame.pb.h"
 
 namespace halflight::client {
@@ -15,7 +14,6 @@ namespace halflight::client {
 struct RenderedFrame {
   v1::FrameHeader header;
   std::vector<std::string> outputs;  // encoded, in the order of header.outputs
-  std::vector<std::string> sha256;   // of each output, as verified
 };
 
 // Takes the messages of one frame. Every error is DATA_LOSS and final.
@@ -36,7 +34,8 @@ class FrameAssembler {
 
   bool started_ = false;
   RenderedFrame frame_;
-  Sha256 sha_;
+  uint32_t crc32c_ = 0;             // of what has come of the next output
+  std::vector<uint32_t> complete_;  // of each output that is complete
 };
 
 }  // namespace halflight::client

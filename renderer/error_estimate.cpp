@@ -167,10 +167,11 @@ absl::StatusOr<ErrorEstimate> EstimateError(const Image& beauty, const Reference
 
 absl::StatusOr<ErrorEstimate> EstimateError(const Image& beauty, const Scene& scene,
                                             const ErrorEstimateOptions& options,
-                                            const std::stop_token& stop) {
+                                            const std::stop_token& stop,
+                                            reference::IndexCache* kept) {
   const ReferenceAt reference =
       [&](std::span<const glm::ivec2> pixels) -> absl::StatusOr<std::vector<glm::dvec4>> {
-    const auto evaluator = reference::Evaluator::Create(scene, stop);
+    const auto evaluator = reference::Evaluator::Create(scene, stop, kept);
     if (!evaluator.ok()) return evaluator.status();
     reference::EvaluateOptions evaluate;
     evaluate.stop = stop;

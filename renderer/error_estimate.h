@@ -20,6 +20,10 @@
 
 namespace halflight {
 
+namespace reference {
+class IndexCache;
+}  // namespace reference
+
 // Errors are of the pixels that the frame covers by more than this.
 inline constexpr double kCovered = 0.01;
 
@@ -76,10 +80,12 @@ using ReferenceAt =
 absl::StatusOr<ErrorEstimate> EstimateError(const Image& beauty, const ReferenceAt& reference,
                                             const ErrorEstimateOptions& options = {});
 
-// Against the scene's own model, evaluated on all cores; `beauty` is the scene's camera window.
-// Cancelled soon after `stop` was requested.
+// Against the scene's own model, evaluated on all cores, from what `kept` holds of the scene's
+// particles where there is one; `beauty` is the scene's camera window. Cancelled soon after `stop`
+// was requested.
 absl::StatusOr<ErrorEstimate> EstimateError(const Image& beauty, const Scene& scene,
                                             const ErrorEstimateOptions& options = {},
-                                            const std::stop_token& stop = {});
+                                            const std::stop_token& stop = {},
+                                            reference::IndexCache* kept = nullptr);
 
 }  // namespace halflight

@@ -47,9 +47,9 @@ EstimatedFigure Certain(double value) { return {value, value, value}; }
 
 }  // namespace
 
-absl::StatusOr<Image> ErrorMap(const Image& beauty, const Scene& scene,
-                               const std::stop_token& stop) {
-  const auto evaluator = reference::Evaluator::Create(scene, stop);
+absl::StatusOr<Image> ErrorMap(const Image& beauty, const Scene& scene, const std::stop_token& stop,
+                               reference::IndexCache* kept) {
+  const auto evaluator = reference::Evaluator::Create(scene, stop, kept);
   if (!evaluator.ok()) return evaluator.status();
   reference::EvaluateOptions options;
   options.stop = stop;

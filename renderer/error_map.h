@@ -12,10 +12,11 @@
 namespace halflight {
 
 // R G B of `beauty`, which is R G B A, premultiplied, and the scene's camera window. As for
-// EstimateError, of a scene that scatters hand in the frame without. Cancelled soon after `stop`
-// was requested. Any thread; uses all cores.
+// EstimateError, of a scene that scatters hand in the frame without, and `kept` saves work.
+// Cancelled soon after `stop` was requested. Any thread; uses all cores.
 absl::StatusOr<Image> ErrorMap(const Image& beauty, const Scene& scene,
-                               const std::stop_token& stop = {});
+                               const std::stop_token& stop = {},
+                               reference::IndexCache* kept = nullptr);
 
 // The figures of all covered pixels, as EstimateError gives them when it samples all, from the map
 // of the same frame. `milliseconds` is left at 0.

@@ -1,6 +1,7 @@
 // Renders frames on one GL context: start reading here.
 #pragma once
 
+#include <cstddef>
 #include <limits>
 #include <memory>
 #include <stop_token>
@@ -39,6 +40,8 @@ class FrameRenderer {
 
   [[nodiscard]] const DeviceInfo& device() const { return device_; }
   [[nodiscard]] const FrameCache& cache() const { return cache_; }
+  // How many programs frames have needed so far.
+  [[nodiscard]] size_t programs_built() const { return gpu_.programs.size(); }
 
  private:
   FrameRenderer(std::unique_ptr<gl::EglContext> context, const FrameRendererOptions& options);

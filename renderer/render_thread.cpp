@@ -7,8 +7,10 @@
 #include <mutex>
 #include <thread>
 #include <utility>
+#include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "renderer/warm_up.h"
 
 namespace halflight {
 
@@ -18,13 +20,13 @@ using Clock = std::chrono::steady_clock;
 
 class RenderThread : public FrameEngine {
  public:
-  explicit RenderThread(int max_queued_frames) : max_queued_frames_(max_queued_frames) {}
+  explicit RenderThread(const RenderThreadOptions& options) : options_(options) {}
   ~RenderThread() override;
   RenderThread(const RenderThread&) = delete;
   RenderThread& operator=(const RenderThread&) = delete;
 
   // Call once; the engine serves when it returned OK.
-  absl::Status Start(const RenderThreadOptions& options);
+  absl::Status Start();
 
   absl::Status Submit(FrameRequest request, std::stop_token stop, Done done) override;
   [[nodiscard]] const DeviceInfo& device() const override { return device_; }
@@ -37,24 +39,26 @@ class RenderThread : public FrameEngine {
     Clock::time_point submitted;
   };
 
-  void Run(const RenderThreadOptions& options, std::promise<absl::StatusOr<DeviceInfo>> started);
+  void Run(std::promise<absl::StatusOr<DeviceInfo>> started);
+  void WarmUp(FrameRenderer& renderer);
   // Waits for a job; false when stopping and none is left.
   bool NextJob(Job& job);
 
-  const int max_queued_frames_;
+  const RenderThreadOptions options_;
   DeviceInfo device_;
   std::mutex mutex_;
   std::condition_variable changed_;
-  std::deque<Job> jobs_;   // guarded by mutex_
-  int unfinished_ = 0;     // guarded by mutex_: waiting or rendering
-  bool stopping_ = false;  // guarded by mutex_
+  std::deque<Job> jobs_;              // guarded by mutex_
+  int unfinished_ = 0;                // guarded by mutex_: waiting or rendering
+  bool stopping_ = false;             // guarded by mutex_
+  std::deque<FrameRequest> warm_up_;  // of the thread's own
   std::thread thread_;
 };
 
-absl::Status RenderThread::Start(const RenderThreadOptions& options) {
+absl::Status RenderThread::Start() {
   std::promise<absl::StatusOr<DeviceInfo>> promise;
   std::future<absl::StatusOr<DeviceInfo>> started = promise.get_future();
-  thread_ = std::thread(&RenderThread::Run, this, options, std::move(promise));
+  thread_ = std::thread(&RenderThread::Run, this, std::move(promise));
   const absl::StatusOr<DeviceInfo> info = started.get();
   if (!info.ok()) return info.status();
   device_ = *info;
@@ -74,9 +78,10 @@ absl::Status RenderThread::Submit(FrameRequest request, std::stop_token stop, Do
   {
     const std::lock_guard lock(mutex_);
     if (stopping_) return absl::UnavailableError("the renderer is shutting down");
-    if (unfinished_ >= max_queued_frames_) {
-      return absl::ResourceExhaustedError(absl::StrCat(
-          "frame queue: ", unfinished_, " frames wait, allowed: at most ", max_queued_frames_));
+    if (unfinished_ >= options_.max_queued_frames) {
+      return absl::ResourceExhaustedError(absl::StrCat("frame queue: ", unfinished_,
+                                                       " frames wait, allowed: at most ",
+                                                       options_.max_queued_frames));
     }
     ++unfinished_;
     jobs_.push_back({std::move(request), std::move(stop), std::move(done), Clock::now()});
@@ -94,17 +99,34 @@ bool RenderThread::NextJob(Job& job) {
   return true;
 }
 
-void RenderThread::Run(const RenderThreadOptions& options,
-                       std::promise<absl::StatusOr<DeviceInfo>> started) {
+// Ends where there is a job: what a request wants goes before what others may want.
+void RenderThread::WarmUp(FrameRenderer& renderer) {
+  while (!warm_up_.empty()) {
+    {
+      const std::lock_guard lock(mutex_);
+      if (stopping_ || !jobs_.empty()) return;
+    }
+    // Whoever asks for such a frame is told what is wrong with it.
+    renderer.Render(warm_up_.front(), {}).IgnoreError();
+    warm_up_.pop_front();
+  }
+}
+
+void RenderThread::Run(std::promise<absl::StatusOr<DeviceInfo>> started) {
   absl::StatusOr<std::unique_ptr<FrameRenderer>> renderer =
-      FrameRenderer::Create(options.device, options.renderer);
+      FrameRenderer::Create(options_.device, options_.renderer);
   if (!renderer.ok()) {
     started.set_value(renderer.status());
     return;
   }
   started.set_value((*renderer)->device());
 
-  for (Job job; NextJob(job); job = {}) {
+  if (options_.warm_up) {
+    const std::vector<FrameRequest> frames = WarmUpFrames();
+    warm_up_.assign(frames.begin(), frames.end());
+    WarmUp(**renderer);
+  }
+  for (Job job; NextJob(job); job = {}, WarmUp(**renderer)) {
     const std::chrono::duration<double, std::milli> waited = Clock::now() - job.submitted;
     absl::StatusOr<FrameResult> frame = job.stop.stop_requested()
                                             ? absl::CancelledError("frame cancelled")
@@ -121,8 +143,8 @@ void RenderThread::Run(const RenderThreadOptions& options,
 }  // namespace
 
 absl::StatusOr<std::unique_ptr<FrameEngine>> StartRenderThread(const RenderThreadOptions& options) {
-  auto engine = std::make_unique<RenderThread>(options.max_queued_frames);
-  if (absl::Status started = engine->Start(options); !started.ok()) return started;
+  auto engine = std::make_unique<RenderThread>(options);
+  if (absl::Status started = engine->Start(); !started.ok()) return started;
   return engine;
 }
 

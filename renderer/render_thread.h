@@ -16,6 +16,9 @@ struct RenderThreadOptions {
   std::string device = "auto";
   int max_queued_frames = 64;  // waiting or rendering
   FrameRendererOptions renderer;
+  // Whether to build what most frames need (warm_up.h) as soon as the engine has started. A frame
+  // that comes meanwhile is rendered before the rest of it.
+  bool warm_up = false;
 };
 
 // Creates the context before it returns. InvalidArgument for a device that cannot be parsed,

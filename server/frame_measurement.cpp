@@ -16,17 +16,19 @@ FrameRequest WithoutScattering(const FrameRequest& request) {
   return compared;
 }
 
-absl::StatusOr<FrameError> MeasureFrame(const Image& beauty, const Scene& scene,
-                                        const MeasureJob& job, const std::stop_token& stop) {
+absl::StatusOr<FrameError> FrameMeasurer::operator()(const Image& beauty, const Scene& scene,
+                                                     const MeasureJob& job,
+                                                     const std::stop_token& stop) const {
   if (!job.map) {
-    absl::StatusOr<ErrorEstimate> estimate = EstimateError(beauty, scene, *job.sample, stop);
+    absl::StatusOr<ErrorEstimate> estimate =
+        EstimateError(beauty, scene, *job.sample, stop, indexes_.get());
     if (!estimate.ok()) {
       return estimate.status();
     }
     return FrameError{*std::move(estimate), std::nullopt};
   }
   const auto begin = std::chrono::steady_clock::now();
-  absl::StatusOr<Image> map = ErrorMap(beauty, scene, stop);
+  absl::StatusOr<Image> map = ErrorMap(beauty, scene, stop, indexes_.get());
   if (!map.ok()) {
     return map.status();
   }

@@ -10,7 +10,6 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
-#include "halflight/sha256.h"
 #include "server/convert/describe.h"
 #include "server/convert/field_checks.h"
 #include "server/frame_log.h"
@@ -58,15 +57,26 @@ struct FramePipeline::Flight {
   std::mutex mutex;
   std::atomic<size_t> outputs_left = 0;
   std::vector<EncodedImage> encoded;
-  std::vector<std::string> digests;
 };
 
 FramePipeline::FramePipeline(FrameEngine& engine, PipelineOptions options)
-    : engine_(engine), options_(std::move(options)), workers_(options_.encode_threads) {}
+    : engine_(engine), options_(std::move(options)), workers_(options_.encode_threads) {
+  if (options_.warm_up) {
+    workers_.Post([this] { WarmUp(); });
+  }
+}
 
 FramePipeline::~FramePipeline() {
   std::unique_lock lock(mutex_);
   idle_.wait(lock, [this] { return flights_ == 0; });
+}
+
+void FramePipeline::WarmUp() {
+  const Image image{16, 16, 1, {"R", "G", "B", "A"}, std::vector<float>(size_t{16} * 16 * 4, 0.5F)};
+  for (const ImageFormat format : {ImageFormat::kPng8, ImageFormat::kExrHalf}) {
+    // A frame that needs the format says what is wrong with it.
+    options_.encode(image, ImageKind::kBeauty, {}, {format}, {}).IgnoreError();
+  }
 }
 
 absl::Status FramePipeline::Admit() {
@@ -241,7 +251,6 @@ void FramePipeline::Encode(const FlightPtr& flight) {
   flight->encode_begin = Clock::now();
   const size_t outputs = flight->job.outputs.size();
   flight->encoded.resize(outputs);
-  flight->digests.resize(outputs);
   flight->outputs_left = outputs;
   for (size_t i = 0; i < outputs; ++i) {
     workers_.Post([this, flight, i] { EncodeOutput(flight, i); });
@@ -258,7 +267,6 @@ void FramePipeline::EncodeOutput(const FlightPtr& flight, size_t index) {
                                             options_.server_version));
   }
   if (encoded.ok()) {
-    flight->digests[index] = Sha256Of(encoded->bytes);
     flight->encoded[index] = *std::move(encoded);
   } else {
     const std::lock_guard lock(flight->mutex);
@@ -289,9 +297,8 @@ void FramePipeline::Complete(const FlightPtr& flight) {
     auto frame = std::make_shared<EncodedFrame>();
     frame->header = DescribeFrame(flight->job, flight->frame, flight->encoded, engine_.device(),
                                   options_.server_version);
-    for (size_t i = 0; i < flight->encoded.size(); ++i) {
-      frame->outputs.push_back(std::move(flight->encoded[i].bytes));
-      frame->trailer.add_output_sha256(flight->digests[i]);
+    for (EncodedImage& encoded : flight->encoded) {
+      frame->outputs.push_back(std::move(encoded.bytes));
     }
     answer = std::shared_ptr<const EncodedFrame>(std::move(frame));
   } else {

@@ -1,5 +1,5 @@
 // A frame's way through the server: rendered on the engine's thread, its error measured where that
-// is asked for and its outputs encoded and hashed on others, and handed over complete. A frame with
+// is asked for and its outputs encoded on others, and handed over complete. A frame with
 // a target is rendered and measured as often as its search wants. Does not send anything and knows
 // no clients.
 #pragma once
@@ -26,16 +26,19 @@
 
 namespace halflight {
 
-// A finished frame as it is sent.
+// A finished frame as it is sent, but for the checksums in its trailer: they are made while
+// sending.
 struct EncodedFrame {
   v1::FrameHeader header;
   std::vector<std::string> outputs;  // bytes, in the request's order
-  v1::FrameTrailer trailer;
 };
 
 struct PipelineOptions {
   uint32_t max_queued_frames = 64;  // accepted and not yet encoded
   int encode_threads = 1;
+  // Whether to encode a small image of each kind of file at once, so that the first frame does not
+  // wait for what the image library does the first time.
+  bool warm_up = false;
   std::string server_version = "unknown";
   // What makes bytes of pixels; any thread.
   std::function<absl::StatusOr<EncodedImage>(const Image&, ImageKind, LightQuantity,
@@ -44,7 +47,7 @@ struct PipelineOptions {
   // What holds a beauty against the image model; one thread of the pipeline, one frame at a time.
   std::function<absl::StatusOr<FrameError>(const Image&, const Scene&, const MeasureJob&,
                                            const std::stop_token&)>
-      measure = MeasureFrame;
+      measure = FrameMeasurer();
 };
 
 class FramePipeline {
@@ -89,6 +92,7 @@ class FramePipeline {
   void Complete(const FlightPtr& flight);
 
   void Fail(const FlightPtr& flight, absl::Status status);
+  void WarmUp();
 
   FrameEngine& engine_;
   const PipelineOptions options_;

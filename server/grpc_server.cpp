@@ -104,6 +104,8 @@ void GrpcServer::BeginDrain() {
 
 bool GrpcServer::idle() const { return parts_->service.active_calls() == 0; }
 
+uint64_t GrpcServer::calls_begun() const { return parts_->service.calls_begun(); }
+
 void GrpcServer::RemoveSocketFiles() const {
   for (const std::string& address : addresses_) {
     if (const std::string path = SocketPath(address); !path.empty()) {

@@ -2,6 +2,7 @@
 // nothing of what the calls do.
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <string>
 #include <vector>
@@ -32,6 +33,8 @@ class GrpcServer {
   void BeginDrain();
   // Whether no call is under way.
   [[nodiscard]] bool idle() const;
+  // Calls that ever began.
+  [[nodiscard]] uint64_t calls_begun() const;
 
   // For leaving without the destructor.
   void RemoveSocketFiles() const;

@@ -5,10 +5,13 @@
 #include <cstdlib>
 #include <iostream>
 #include <memory>
+#include <optional>
 
 #include <spdlog/sinks/stdout_sinks.h>
 #include <spdlog/spdlog.h>
 
+#include "renderer/block_cache.h"
+#include "renderer/kept_memory.h"
 #include "renderer/render_thread.h"
 #include "server/grpc_server.h"
 #include "server/options.h"
@@ -24,6 +27,9 @@ constexpr int kExitCutShort = 3;
 
 // How often a drain looks whether it is over.
 constexpr timespec kDrainPoll{.tv_sec = 0, .tv_nsec = 20'000'000};
+// How long no call may come before memory goes back: longer than the pauses of somebody at work,
+// who would wait for it to be taken again.
+constexpr timespec kIdlePoll{.tv_sec = 10, .tv_nsec = 0};
 
 sigset_t BlockTerminationSignals() {
   sigset_t signals;
@@ -32,6 +38,24 @@ sigset_t BlockTerminationSignals() {
   sigaddset(&signals, SIGINT);
   pthread_sigmask(SIG_BLOCK, &signals, nullptr);
   return signals;
+}
+
+// The signal that ends the service. Meanwhile gives memory back whenever calls have stopped coming.
+int WaitForSignal(const GrpcServer& server, const sigset_t& signals) {
+  uint64_t seen = 0;
+  std::optional<uint64_t> given_back;
+  while (true) {
+    if (const int signal = sigtimedwait(&signals, nullptr, &kIdlePoll); signal > 0) {
+      return signal;
+    }
+    const uint64_t begun = server.calls_begun();
+    if (server.idle() && begun == seen && begun != given_back) {
+      BlockCache::Release();
+      GiveBackFreedMemory();
+      given_back = begun;
+    }
+    seen = begun;
+  }
 }
 
 // True when nothing is under way any more, false when a second signal or the time came first.
@@ -56,7 +80,8 @@ int Run(const Options& options, const sigset_t& signals) {
   auto engine =
       StartRenderThread({.device = options.device,
                          .max_queued_frames = static_cast<int>(options.limits.max_queued_frames),
-                         .renderer = {.max_reuse_bytes = options.max_reuse_bytes}});
+                         .renderer = {.max_reuse_bytes = options.max_reuse_bytes},
+                         .warm_up = true});
   if (!engine.ok()) {
     return Fail(kExitCannotStart, engine.status());
   }
@@ -71,6 +96,7 @@ int Run(const Options& options, const sigset_t& signals) {
   ByteBudget upload_memory(limits.max_cache_bytes);
   FramePipeline pipeline(**engine, {.max_queued_frames = limits.max_queued_frames,
                                     .encode_threads = options.encode_threads,
+                                    .warm_up = true,
                                     .server_version = version});
   auto server = GrpcServer::Start(options.addresses,
                                   {device, limits, version, store, upload_memory, pipeline});
@@ -81,8 +107,7 @@ int Run(const Options& options, const sigset_t& signals) {
     spdlog::info("listening address={}", address);
   }
 
-  int signal = 0;
-  sigwait(&signals, &signal);
+  const int signal = WaitForSignal(**server, signals);
   spdlog::info("draining signal={} drain_seconds={}", signal, options.drain_seconds);
   if (!Drain(**server, signals, options.drain_seconds)) {
     // At once: what runs may be stuck, so nothing is waited for.
@@ -104,6 +129,7 @@ int main(int argc, char** argv) {
   if (!options->has_value()) {
     return EXIT_SUCCESS;
   }
+  KeepFreedMemory();
   // Before any thread is made: all of them inherit the mask.
   const sigset_t signals = BlockTerminationSignals();
   spdlog::set_default_logger(spdlog::stderr_logger_mt("halflightd"));

@@ -26,6 +26,7 @@ using grpc::CallbackServerContext;
 // How many calls are under way, and whether more may come.
 struct CallCount {
   std::atomic<int> active = 0;
+  std::atomic<uint64_t> begun = 0;
   std::atomic<bool> draining = false;
 };
 
@@ -33,7 +34,10 @@ struct CallCount {
 // calls can be sure that none slips in.
 class CallToken {
  public:
-  explicit CallToken(CallCount& count) : count_(count) { ++count_.active; }
+  explicit CallToken(CallCount& count) : count_(count) {
+    ++count_.active;
+    ++count_.begun;
+  }
   ~CallToken() { --count_.active; }
   CallToken(const CallToken&) = delete;
   CallToken& operator=(const CallToken&) = delete;
@@ -229,5 +233,7 @@ grpc::Service& RenderService::grpc_service() { return *calls_; }
 void RenderService::BeginDrain() { calls_->count().draining = true; }
 
 int RenderService::active_calls() const { return calls_->count().active; }
+
+uint64_t RenderService::calls_begun() const { return calls_->count().begun; }
 
 }  // namespace halflight

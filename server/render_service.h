@@ -2,6 +2,7 @@
 // What the calls do stands in handlers/.
 #pragma once
 
+#include <cstdint>
 #include <memory>
 
 #include "server/handlers/backend.h"
@@ -29,6 +30,8 @@ class RenderService {
   void BeginDrain();
   // Calls under way.
   [[nodiscard]] int active_calls() const;
+  // All that ever began.
+  [[nodiscard]] uint64_t calls_begun() const;
 
  private:
   class Calls;

@@ -78,7 +78,7 @@ void AddOutputFlags(CLI::App& app, RenderOptions& options) {
                                  {"piz", v1::EXR_COMPRESSION_PIZ},
                                  {"dwaa", v1::EXR_COMPRESSION_DWAA},
                                  {"dwab", v1::EXR_COMPRESSION_DWAB}},
-                                "Compression of EXRs; default: zips");
+                                "Compression of EXRs; default: zip");
   AddChoice<v1::LightQuantity>(app, "--quantity", options.quantity,
                                {{"transmittance", v1::LIGHT_QUANTITY_TRANSMITTANCE},
                                 {"optical-depth", v1::LIGHT_QUANTITY_OPTICAL_DEPTH}},

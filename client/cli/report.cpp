@@ -30,7 +30,7 @@ std::string OutputsJson(const FrameReport& report, const RenderedFrame& frame) {
     JsonObject output;
     output.Add("name", OutputName(info.output().kind()));
     output.Add("path", report.paths[i]);
-    output.Add("sha256", ToHex(frame.sha256[i]));
+    output.Add("sha256", ToHex(Sha256Of(frame.outputs[i])));
     output.AddJson("info", JsonOf(info));
     list += (i == 0 ? "" : ",") + output.Text();
   }

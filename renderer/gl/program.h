@@ -1,6 +1,7 @@
 // Programs from embedded SPIR-V, specialised by constants.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <map>
 #include <span>
@@ -33,6 +34,8 @@ class ProgramCache {
  public:
   // The name of the program, valid as long as the cache.
   absl::StatusOr<GLuint> Get(const ProgramSource& source, const Constants& constants);
+
+  [[nodiscard]] size_t size() const { return programs_.size(); }
 
  private:
   std::map<std::pair<const ProgramSource*, Constants>, Program> programs_;

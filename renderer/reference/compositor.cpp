@@ -160,10 +160,11 @@ class Compositor::Blending {
   double depth_range_;
 };
 
+EyeIndex::EyeIndex(const Rays& rays, const Cloud& cloud, const std::stop_token& stop)
+    : order(OrderFromLight(rays, cloud, stop)), index(rays, cloud, order, stop) {}
+
 IndexedEye::IndexedEye(const Scene& scene, const Cloud& cloud, const std::stop_token& stop)
-    : eye(scene),
-      order(OrderFromLight(eye.rays(), cloud, stop)),
-      index(eye.rays(), cloud, order, stop) {}
+    : eye(scene), particles(std::make_shared<const EyeIndex>(eye.rays(), cloud, stop)) {}
 
 Compositor::Compositor(const Scene& scene, const Cloud& cloud, IndexedEye eye,
                        std::vector<Pass> passes)
@@ -181,9 +182,10 @@ Compositor::Compositor(const Scene& scene, const Cloud& cloud, IndexedEye eye,
 
 void Compositor::FindHits(const EyeRay& ray, std::vector<Hit>& hits) const {
   hits.clear();
-  eye_.index.VisitCandidates(ray.origin + ray.direction, [&](uint32_t begin, uint32_t end) {
+  const EyeIndex& eye = *eye_.particles;
+  eye.index.VisitCandidates(ray.origin + ray.direction, [&](uint32_t begin, uint32_t end) {
     for (uint32_t entry = begin; entry < end; ++entry) {
-      const uint32_t index = eye_.order[eye_.index.ranks()[entry]];
+      const uint32_t index = eye.order[eye.index.ranks()[entry]];
       const Particle& particle = cloud_.particles[index];
       const glm::dvec3 offset = particle.center - ray.origin;
       const double along = glm::dot(offset, ray.direction);

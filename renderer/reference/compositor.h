@@ -4,8 +4,10 @@
 
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <span>
 #include <stop_token>
+#include <utility>
 #include <vector>
 
 #include <glm/vec2.hpp>
@@ -45,14 +47,25 @@ struct PixelSample {
   std::vector<glm::dvec3> transmittance;  // by light, likewise
 };
 
-// A camera, and the particles as its rays meet them. Of some of the particles only, soon after
-// `stop` was requested.
-struct IndexedEye {
-  IndexedEye(const Scene& scene, const Cloud& cloud, const std::stop_token& stop);
+// The particles as an eye's rays meet them. Of some of the particles only, soon after `stop` was
+// requested.
+struct EyeIndex {
+  EyeIndex(const Rays& rays, const Cloud& cloud, const std::stop_token& stop);
 
-  Eye eye;
+  [[nodiscard]] size_t bytes() const { return order.size() * sizeof(order[0]) + index.bytes(); }
+
   std::vector<uint32_t> order;  // of the index: nearest first
   RayIndex index;
+};
+
+// A camera, and the index of its rays.
+struct IndexedEye {
+  IndexedEye(const Scene& scene, const Cloud& cloud, const std::stop_token& stop);
+  IndexedEye(const Eye& camera, std::shared_ptr<const EyeIndex> indexed)
+      : eye(camera), particles(std::move(indexed)) {}
+
+  Eye eye;
+  std::shared_ptr<const EyeIndex> particles;
 };
 
 class Compositor {

@@ -8,19 +8,19 @@
 #include <thread>
 
 #include "absl/status/status.h"
+#include "renderer/reference/index_cache.h"
 #include "renderer/reference/light_depth.h"
 
 namespace halflight::reference {
 namespace {
 
-// Sorts the particles for one light and indexes them, if it casts shadows.
-PassLight ShadowedLight(size_t index, const Scene& scene, const Cloud& cloud,
+// Of one light, with the particles sorted and indexed for it, if it casts shadows.
+PassLight ShadowedLight(size_t index, const Scene& scene, const Cloud& cloud, IndexCache& kept,
                         const std::stop_token& stop) {
   const Light& light = scene.lights[index];
   const Rays rays = RaysOf(light, scene);
   if (!light.casts_shadows()) return {index, light, rays, nullptr};
-  const auto buffer =
-      std::make_shared<const LightDepth>(rays, cloud, OrderFromLight(rays, cloud, stop), stop);
+  const std::shared_ptr<const LightDepth> buffer = kept.DepthOf(scene, cloud, rays, stop);
   return {index, light, rays, [buffer](const glm::dvec3& x, uint32_t particle, double enough) {
             return buffer->Between(x, 0, buffer->ranks()[particle], enough);
           }};
@@ -40,19 +40,24 @@ void Store(const PixelSample& sample, size_t i, PixelValues& values) {
 }  // namespace
 
 absl::StatusOr<std::unique_ptr<const Evaluator>> Evaluator::Create(const Scene& scene,
-                                                                   const std::stop_token& stop) {
-  std::unique_ptr<Evaluator> evaluator(new Evaluator(scene));
-  const Cloud& cloud = evaluator->cloud_;
+                                                                   const std::stop_token& stop,
+                                                                   IndexCache* kept) {
+  IndexCache own(0);
+  IndexCache& indexes = kept != nullptr ? *kept : own;
+  std::unique_ptr<Evaluator> evaluator(new Evaluator(scene.camera.window));
+  evaluator->cloud_ = indexes.ParticlesOf(scene);
+  const Cloud& cloud = *evaluator->cloud_;
   // The eye's index and those of the lights are made at the same time.
   std::vector<std::future<PassLight>> lights;
   for (size_t light = 0; light < scene.lights.size(); ++light) {
     const auto policy =
         scene.lights[light].casts_shadows() ? std::launch::async : std::launch::deferred;
-    lights.push_back(std::async(policy, [&scene, &cloud, &stop, light] {
-      return ShadowedLight(light, scene, cloud, stop);
+    lights.push_back(std::async(policy, [&scene, &cloud, &indexes, &stop, light] {
+      return ShadowedLight(light, scene, cloud, indexes, stop);
     }));
   }
-  IndexedEye eye(scene, cloud, stop);
+  const Eye camera(scene);
+  IndexedEye eye(camera, indexes.EyeIndexOf(scene, cloud, camera.rays(), stop));
   Pass pass{.nearness = {}, .ambient_and_emission = true, .lights = {}};
   for (std::future<PassLight>& light : lights) pass.lights.push_back(light.get());
   evaluator->compositor_ = std::make_unique<const Compositor>(scene, cloud, std::move(eye),

@@ -21,6 +21,8 @@
 
 namespace halflight::reference {
 
+class IndexCache;
+
 // One element for each pixel evaluated.
 struct PixelValues {
   std::vector<glm::dvec4> rgba;  // premultiplied
@@ -41,10 +43,12 @@ struct EvaluateOptions {
 
 class Evaluator {
  public:
-  // Sorts and indexes the particles for the eye and for every light that casts shadows. Keeps
-  // nothing of the scene. Cancelled soon after `stop` was requested.
+  // Sorts and indexes the particles for the eye and for every light that casts shadows, or takes
+  // from `kept` what it has of that, and leaves there what it has not. Keeps nothing of the scene.
+  // Cancelled soon after `stop` was requested.
   static absl::StatusOr<std::unique_ptr<const Evaluator>> Create(const Scene& scene,
-                                                                 const std::stop_token& stop = {});
+                                                                 const std::stop_token& stop = {},
+                                                                 IndexCache* kept = nullptr);
 
   // At places in the camera's window. The value of a pixel does not depend on which others are
   // evaluated, nor on the number of threads, to the last bit. Cancelled soon after the stop was
@@ -57,11 +61,10 @@ class Evaluator {
       const EvaluateOptions& options = {}) const;
 
  private:
-  explicit Evaluator(const Scene& scene)
-      : cloud_(ResolveCloud(scene)), window_(scene.camera.window) {}
+  explicit Evaluator(const PixelRect& window) : window_(window) {}
 
-  Cloud cloud_;
   PixelRect window_;
+  std::shared_ptr<const Cloud> cloud_;  // which the compositor refers to
   std::unique_ptr<const Compositor> compositor_;
 };
 

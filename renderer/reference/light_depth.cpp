@@ -61,6 +61,12 @@ double LightDepth::Between(const glm::dvec3& x, uint32_t begin, uint32_t end, do
   return sum;
 }
 
+size_t LightDepth::bytes() const {
+  const size_t columns = index_.rays().parallel() ? 4 : 5;
+  return index_.bytes() + columns * columns_.x.size() * sizeof(double) +
+         ranks_.size() * sizeof(ranks_[0]);
+}
+
 std::vector<uint32_t> OrderFromLight(const Rays& rays, const Cloud& cloud,
                                      const std::stop_token& stop) {
   std::vector<double> nearness;

@@ -29,6 +29,7 @@ class LightDepth {
   [[nodiscard]] double Between(const glm::dvec3& x, uint32_t begin, uint32_t end,
                                double enough = std::numeric_limits<double>::infinity()) const;
 
+  [[nodiscard]] size_t bytes() const;
   // By particle.
   [[nodiscard]] const std::vector<uint32_t>& ranks() const { return ranks_; }
 

@@ -39,6 +39,9 @@ class RayIndex {
     }
   }
 
+  [[nodiscard]] size_t bytes() const {
+    return grids_.size() * sizeof(Grid) + (first_.size() + ranks_.size()) * sizeof(uint32_t);
+  }
   // Positions in `order`, of each cell's particles after the other's.
   [[nodiscard]] const std::vector<uint32_t>& ranks() const { return ranks_; }
   [[nodiscard]] const Rays& rays() const { return rays_; }

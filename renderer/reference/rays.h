@@ -31,6 +31,8 @@ class Rays {
   // The point, or the direction.
   [[nodiscard]] const glm::dvec3& vector() const { return vector_; }
 
+  bool operator==(const Rays&) const = default;
+
  private:
   Rays(bool parallel, const glm::dvec3& vector) : parallel_(parallel), vector_(vector) {}
 

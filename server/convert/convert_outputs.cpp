@@ -65,7 +65,7 @@ OutputJob ConvertOutput(const v1::Output& output, const Scene& scene, const std:
   }
   job.encoding.format =
       FromProto(kFormats, output.format(), DefaultFormat(kind), path + ".format", checks);
-  job.encoding.compression = FromProto(kCompressions, output.compression(), ExrCompression::kZips,
+  job.encoding.compression = FromProto(kCompressions, output.compression(), ExrCompression::kZip,
                                        path + ".compression", checks);
   if (output.compression() != v1::EXR_COMPRESSION_UNSPECIFIED && !IsExr(job.encoding.format)) {
     checks.Reject(path + ".compression", fmt::format("{}", output.compression()),

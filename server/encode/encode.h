@@ -23,7 +23,7 @@ enum class ExrCompression : uint8_t { kNone, kRle, kZips, kZip, kPiz, kDwaa, kDw
 
 struct EncodeSettings {
   ImageFormat format;
-  ExrCompression compression = ExrCompression::kZips;  // only EXR reads it
+  ExrCompression compression = ExrCompression::kZip;  // only EXR reads it
 };
 
 // What a file says about its pixels. Matrices act on column vectors; camera space is x right, y up,

@@ -36,7 +36,7 @@ const char* CompressionName(ExrCompression compression) {
     case ExrCompression::kDwab:
       return "dwab";
   }
-  return "zips";
+  return "zip";
 }
 
 // GLM keeps the columns of a matrix that acts on column vectors one after the other; read row by

@@ -2,7 +2,6 @@
 #include "server/encode/raw.h"
 
 #include <bit>
-#include <cstring>
 
 namespace halflight {
 
@@ -10,8 +9,7 @@ absl::StatusOr<EncodedImage> EncodeRawFloat(const EncodeInput& input) {
   static_assert(std::endian::native == std::endian::little, "the format is little-endian");
   const std::vector<float>& pixels = input.image.pixels;
   EncodedImage encoded{};
-  encoded.bytes.resize(pixels.size() * sizeof(float));
-  std::memcpy(encoded.bytes.data(), pixels.data(), encoded.bytes.size());
+  encoded.bytes.assign(reinterpret_cast<const char*>(pixels.data()), pixels.size() * sizeof(float));
   return encoded;
 }
 

@@ -1,14 +1,16 @@
 // A finished frame cut into the messages it is sent as: header, chunks of every output, trailer.
-// Copies one chunk at a time; sends nothing.
+// Copies and checksums one chunk at a time, so that the peer receives and checks one chunk while
+// the next is made ready; sends nothing.
 #pragma once
 
-#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <utility>
 
+#include "halflight/crc32c.h"
 #include "server/frame_pipeline.h"
 
 namespace halflight {
@@ -28,21 +30,22 @@ class FrameMessages {
       case Part::kHeader:
         *message.mutable_header() = frame_->header;
         next_ = Part::kChunk;
-        SkipEmptyOutputs();
+        SealComplete();
         return true;
       case Part::kChunk: {
-        const std::string& bytes = frame_->outputs[output_];
-        const size_t size = std::min(kChunkBytes, bytes.size() - offset_);
+        const std::string_view bytes = frame_->outputs[output_];
+        const std::string_view data = bytes.substr(offset_, kChunkBytes);
         v1::OutputChunk& chunk = *message.mutable_chunk();
         chunk.set_output_index(static_cast<uint32_t>(output_));
         chunk.set_offset(offset_);
-        chunk.set_data(bytes.data() + offset_, size);
-        offset_ += size;
-        SkipEmptyOutputs();
+        chunk.set_data(data.data(), data.size());
+        crc32c_ = ExtendCrc32c(crc32c_, data);
+        offset_ += data.size();
+        SealComplete();
         return true;
       }
       case Part::kTrailer:
-        *message.mutable_trailer() = frame_->trailer;
+        *message.mutable_trailer() = trailer_;
         next_ = Part::kEnd;
         return true;
       case Part::kEnd:
@@ -54,9 +57,11 @@ class FrameMessages {
  private:
   enum class Part : uint8_t { kHeader, kChunk, kTrailer, kEnd };
 
-  // To the next byte to send, or the trailer where there is none.
-  void SkipEmptyOutputs() {
+  // Seals the outputs of which all is sent, up to the next byte to send, or to the trailer where
+  // there is none.
+  void SealComplete() {
     while (output_ < frame_->outputs.size() && offset_ == frame_->outputs[output_].size()) {
+      trailer_.add_output_crc32c(std::exchange(crc32c_, 0));
       ++output_;
       offset_ = 0;
     }
@@ -69,6 +74,8 @@ class FrameMessages {
   Part next_ = Part::kHeader;
   size_t output_ = 0;
   size_t offset_ = 0;
+  uint32_t crc32c_ = 0;  // of the output that is being sent
+  v1::FrameTrailer trailer_;
 };
 
 }  // namespace halflight

@@ -14,6 +14,7 @@
 #include <string>
 #include <vector>
 
+#include "halflight/crc32c.h"
 #include "halflight/particle_payload.h"
 #include "halflight/v1/service.grpc.pb.h"
 
@@ -207,7 +208,7 @@ class FakeService final : public v1::RenderService::Service {
     for (int i = 0; i < request.outputs_size(); ++i) {
       const std::string bytes = OutputBytes(request, i);
       header.mutable_header()->add_outputs()->set_byte_size(bytes.size());
-      trailer.mutable_trailer()->add_output_sha256(Sha256Of(bytes));
+      trailer.mutable_trailer()->add_output_crc32c(ExtendCrc32c(0, bytes));
     }
     send(header);
     for (int i = 0; i < request.outputs_size(); ++i) {

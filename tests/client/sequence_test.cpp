@@ -156,7 +156,7 @@ TEST_F(SequenceTest, DetectsDamagedOutputs) {
       (*message.mutable_chunk()->mutable_data())[7] ^= 1;
     }
   };
-  ExpectError(Render(4), StatusCode::kDataLoss, {"SHA-256"});
+  ExpectError(Render(4), StatusCode::kDataLoss, {"CRC-32C"});
   EXPECT_THAT(taken_, ElementsAre(0, 1));
 }
 

@@ -5,7 +5,6 @@
 
 #include <gtest/gtest.h>
 
-#include "halflight/sha256.h"
 #include "renderer/frame_renderer.h"
 #include "tests/loopback/test_server.h"
 #include "tests/loopback/wire_scene.h"
@@ -39,13 +38,12 @@ TEST(SamePixels, RequestTwiceGivesTheSameBytesOverAnyTransport) {
   EXPECT_EQ(MustRender(*local, request).outputs, first.outputs);
 }
 
-TEST(SamePixels, DigestsAreThoseOfTheBytes) {
+TEST(SamePixels, SizesAreThoseOfTheBytes) {
   const TestServer server;
   client::Client client = server.Connect();
   const client::RenderedFrame frame = MustRender(client, InThreeFormats(test::BallScene(100, 200)));
-  ASSERT_EQ(frame.sha256.size(), 4U);
+  ASSERT_EQ(frame.outputs.size(), 4U);
   for (size_t i = 0; i < frame.outputs.size(); ++i) {
-    EXPECT_EQ(frame.sha256[i], Sha256Of(frame.outputs[i]));
     EXPECT_EQ(frame.header.outputs(static_cast<int>(i)).byte_size(), frame.outputs[i].size());
   }
 }

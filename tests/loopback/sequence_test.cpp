@@ -2,6 +2,9 @@
 
 #include <cmath>
 #include <stop_token>
+#include <string>
+#include <thread>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -113,6 +116,46 @@ TEST(Sequence, InvalidRequestInTheMiddleEndsItAfterTheFramesBefore) {
               StartsWith("frame 3: scene.shadow.slices: 1073741824"));
   ASSERT_EQ(frames.size(), 3U);
   EXPECT_EQ(frames[2], MustRender(client, RequestOf(SceneOf(2))).outputs[0]);
+}
+
+TEST(Sequence, TheNextSetsArriveWhileAFrameIsRenderedAndNoMoreThanAllowed) {
+  constexpr uint64_t kFrames = 12;
+  constexpr uint32_t kAhead = 3;
+  const TestServer server;
+  const auto set_of = [](uint64_t index) { return Encoded(*test::Ball(50, 100 + index)); };
+  std::vector<std::string> names;
+  for (uint64_t index = 0; index < kFrames; ++index) names.push_back(set_of(index).sha256);
+
+  uint64_t taken = 0;
+  absl::Status status;
+  std::jthread caller;
+  {
+    const RendererHeld held;
+    caller = std::jthread([&] {
+      client::Client client = server.Connect();
+      status = client.RenderSequence(
+          kFrames,
+          [&](uint64_t index) -> absl::StatusOr<client::SequenceFrame> {
+            client::SequenceFrame frame = FrameOf(index);
+            frame.particles = set_of(index);
+            return frame;
+          },
+          [&](uint64_t, const client::RenderedFrame&) {
+            ++taken;
+            return absl::OkStatus();
+          },
+          kAhead);
+    });
+    // Nothing is rendered yet, and the sets of the frames ahead are there; those behind are not.
+    client::Client other = server.Connect();
+    const auto missing = [&] { return *other.FindMissing(names); };
+    EXPECT_TRUE(WaitFor([&] { return missing().size() <= kFrames - 1 - kAhead; }));
+    EXPECT_EQ(missing(), std::vector<std::string>(names.begin() + 1 + kAhead, names.end()));
+    EXPECT_EQ(taken, 0U);
+  }
+  caller.join();
+  EXPECT_TRUE(status.ok()) << status;
+  EXPECT_EQ(taken, kFrames);
 }
 
 TEST(Sequence, CancelledMidwayLeavesTheServerAsItWas) {

@@ -53,7 +53,7 @@ class Measurement : public testing::PipelineTest {
              const std::lock_guard lock(mutex_);
              compared_.push_back(beauty.pixels);
              threads_.insert(std::this_thread::get_id());
-             return MeasureFrame(beauty, scene, job, stop);
+             return FrameMeasurer()(beauty, scene, job, stop);
            }});
   }
 
@@ -216,7 +216,7 @@ TEST_F(Measurement, OfAFrameThatWasCancelledBeforeIsNotBegun) {
                         const std::stop_token& stop) {
            ++begun;
            held.wait();
-           return MeasureFrame(beauty, scene, job, stop);
+           return FrameMeasurer()(beauty, scene, job, stop);
          }});
   auto first = Submit(MustConvert(MeasuredRequest()));
   std::stop_source stop;
@@ -236,7 +236,7 @@ TEST_F(Measurement, HoldsUpNeitherRenderingNorFramesThatAreNotMeasured) {
                                                           const MeasureJob& job,
                                                           const std::stop_token& stop) {
            held.wait();
-           return MeasureFrame(beauty, scene, job, stop);
+           return FrameMeasurer()(beauty, scene, job, stop);
          }});
   auto measured = Submit(MustConvert(MeasuredRequest()));
   EXPECT_TRUE(Submit(MustConvert()).get().ok());

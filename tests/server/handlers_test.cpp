@@ -10,7 +10,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "halflight/sha256.h"
+#include "halflight/crc32c.h"
 #include "server/handlers/find_missing_particles.h"
 #include "server/handlers/get_server_info.h"
 #include "server/handlers/render_frame.h"
@@ -187,7 +187,7 @@ TEST_F(Handlers, FrameArrivesAsHeaderChunksWithoutGapsAndTrailer) {
   }
   for (int i = 0; i < 2; ++i) {
     EXPECT_EQ(outputs[i].size(), messages.front().header().outputs(i).byte_size());
-    EXPECT_EQ(Sha256Of(outputs[i]), messages.back().trailer().output_sha256(i));
+    EXPECT_EQ(ExtendCrc32c(0, outputs[i]), messages.back().trailer().output_crc32c(i));
   }
 }
 

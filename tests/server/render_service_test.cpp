@@ -12,6 +12,7 @@
 #include <grpcpp/grpcpp.h>
 #include <gtest/gtest.h>
 
+#include "halflight/crc32c.h"
 #include "halflight/particle_payload.h"
 #include "halflight/v1/service.grpc.pb.h"
 #include "server/grpc_server.h"
@@ -88,8 +89,8 @@ TEST_F(Service, FrameBytesMatchTheTrailer) {
   ASSERT_TRUE(status.ok()) << status.error_message();
   EXPECT_EQ(bytes.size(), 1024U * 1024U * 16U);
   EXPECT_EQ(header.outputs(0).byte_size(), bytes.size());
-  ASSERT_EQ(trailer.output_sha256_size(), 1);
-  EXPECT_EQ(trailer.output_sha256(0), Sha256Of(bytes));
+  ASSERT_EQ(trailer.output_crc32c_size(), 1);
+  EXPECT_EQ(trailer.output_crc32c(0), ExtendCrc32c(0, bytes));
 }
 
 TEST_F(Service, CancelledInMidStreamTheServerLetsGoAndLivesOn) {
