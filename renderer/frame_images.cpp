@@ -2,6 +2,8 @@
 
 #include <cmath>
 #include <limits>
+#include <optional>
+#include <utility>
 
 #include "renderer/parallel.h"
 
@@ -107,12 +109,16 @@ Image SelectImage(const ImageRequest& request, const Scene& scene, const DrawnIm
 
 }  // namespace
 
-std::vector<Image> SelectImages(const FrameRequest& request, const DrawnImages& drawn) {
-  std::vector<Image> images;
-  images.reserve(request.images.size());
-  for (const ImageRequest& image : request.images) {
-    images.push_back(SelectImage(image, request.scene, drawn));
+std::vector<Image> SelectImages(const FrameRequest& request, DrawnImages&& drawn) {
+  std::vector<Image> images(request.images.size());
+  std::optional<size_t> last_beauty;
+  for (size_t i = 0; i < images.size(); ++i) {
+    if (request.images[i].kind == ImageKind::kBeauty) last_beauty = i;
   }
+  for (size_t i = 0; i < images.size(); ++i) {
+    if (i != last_beauty) images[i] = SelectImage(request.images[i], request.scene, drawn);
+  }
+  if (last_beauty) images[*last_beauty] = std::move(drawn.beauty);
   return images;
 }
 

@@ -26,8 +26,8 @@ struct DrawnImages {
   std::vector<ShadowResult> shadows;  // by light
 };
 
-// The images that were asked for.
-std::vector<Image> SelectImages(const FrameRequest& request, const DrawnImages& drawn);
+// The images that were asked for. The last beauty among them takes what was drawn, uncopied.
+std::vector<Image> SelectImages(const FrameRequest& request, DrawnImages&& drawn);
 
 // All four channels of a texture. Waits for the device.
 Image ReadTexture(const gl::Texture& texture);

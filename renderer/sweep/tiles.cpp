@@ -21,12 +21,6 @@ void ForTilesOf(const Rect& rect, int tile_size, int tiles_across, const Visit& 
 
 }  // namespace
 
-TileRange TilesOf(const Rect& rect, int tile_size) {
-  if (rect.empty()) return {};
-  return {rect.x_begin / tile_size, (rect.x_end - 1) / tile_size + 1, rect.y_begin / tile_size,
-          (rect.y_end - 1) / tile_size + 1};
-}
-
 std::vector<uint32_t> LongestFirst(const TileLists& lists) {
   std::vector<uint32_t> tiles(lists.begin.size() - 1);
   std::iota(tiles.begin(), tiles.end(), 0U);

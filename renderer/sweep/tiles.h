@@ -1,6 +1,7 @@
 // Which particles touch which tile of a target, in order; and how many of them are listed at once.
 #pragma once
 
+#include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -37,8 +38,13 @@ struct TileRange {
   }
 };
 
-// Those that a rectangle touches.
-TileRange TilesOf(const Rect& rect, int tile_size);
+// Those that a rectangle touches; tile sizes are powers of two.
+inline TileRange TilesOf(const Rect& rect, int tile_size) {
+  if (rect.empty()) return {};
+  const int shift = std::countr_zero(static_cast<unsigned>(tile_size));
+  return {rect.x_begin >> shift, ((rect.x_end - 1) >> shift) + 1, rect.y_begin >> shift,
+          ((rect.y_end - 1) >> shift) + 1};
+}
 
 struct TileLists {
   glm::ivec2 tiles{0};

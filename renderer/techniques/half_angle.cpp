@@ -222,7 +222,7 @@ absl::StatusOr<DrawnFrame> HalfAngle::Draw(const DrawContext& context) const {
   if (absl::Status status = gl::CheckErrors("frame"); !status.ok()) return status;
 
   context.clock.BeginCpu("images");
-  frame.images = SelectImages(context.request, drawn);
+  frame.images = SelectImages(context.request, std::move(drawn));
   return frame;
 }
 

@@ -246,7 +246,7 @@ absl::StatusOr<DrawnFrame> DrawOnCpu(const DrawContext& context) {
     }
   }
   clock.BeginCpu("images");
-  frame.images = SelectImages(request, drawn);
+  frame.images = SelectImages(request, std::move(drawn));
   return frame;
 }
 

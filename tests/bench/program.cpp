@@ -12,6 +12,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "renderer/frame_renderer.h"
+#include "renderer/kept_memory.h"
 #include "tests/bench/figures.h"
 #include "tests/bench/goals.h"
 #include "tests/bench/page.h"
@@ -73,6 +74,7 @@ absl::Status Measure(ProgramOptions options, const ServicePart& service) {
 }  // namespace
 
 int RunProgram(int argc, char** argv, const ServicePart& service) {
+  KeepFreedMemory();  // as halflightd does
   ProgramOptions options;
   std::string revision;
   bool gpu = false;

@@ -179,7 +179,7 @@ absl::StatusOr<DrawnFrame> DrawOnDevice(const DrawContext& context,
   if (!status.ok()) return status;
   if (status = gl::CheckErrors("frame"); !status.ok()) return status;
   context.clock.BeginCpu("images");
-  frame.images = SelectImages(request, drawn);
+  frame.images = SelectImages(request, std::move(drawn));
   return frame;
 }
 
