@@ -31,9 +31,9 @@ Cache& TheCache() {
   return cache;
 }
 
-// Eight sizes from each power of two to the next.
+// Eight sizes from each power of two to the next. `bytes` is at least kLeastBytes.
 size_t RoundedUp(size_t bytes) {
-  const size_t step = std::bit_floor(bytes) / 8;
+  const size_t step = std::max<size_t>(std::bit_floor(bytes) / 8, 1);
   return (bytes + step - 1) / step * step;
 }
 
