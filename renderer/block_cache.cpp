@@ -62,28 +62,28 @@ void FreeAll(const std::vector<Idle>& blocks) {
   for (const Idle& idle : blocks) ::operator delete(idle.block, AlignmentOf(idle.bytes));
 }
 
+void FreeDownTo(size_t limit) {
+  std::vector<Idle> taken;
+  {
+    Cache& cache = TheCache();
+    const std::lock_guard lock(cache.mutex);
+    taken = TakeDownTo(limit, cache);
+  }
+  FreeAll(taken);
+}
+
 }  // namespace
 
 void BlockCache::SetLimit(size_t bytes) {
-  std::vector<Idle> taken;
   {
     Cache& cache = TheCache();
     const std::lock_guard lock(cache.mutex);
     cache.limit = bytes;
-    taken = TakeDownTo(bytes, cache);
   }
-  FreeAll(taken);
+  FreeDownTo(bytes);
 }
 
-void BlockCache::Release() {
-  std::vector<Idle> taken;
-  {
-    Cache& cache = TheCache();
-    const std::lock_guard lock(cache.mutex);
-    taken = TakeDownTo(0, cache);
-  }
-  FreeAll(taken);
-}
+void BlockCache::Release() { FreeDownTo(0); }
 
 size_t BlockCache::idle_bytes() {
   Cache& cache = TheCache();

@@ -34,9 +34,7 @@ absl::StatusOr<FramePlan> PlanFrame(const FrameRequest& request, const ParticleV
   FramePlan plan;
   plan.window_size = {scene.camera.window.width, scene.camera.window.height};
   plan.composite_size = CompositeSize(scene.camera.window, scene.sampling);
-  for (const ImageRequest& image : request.images) {
-    plan.keep_depth |= image.kind == ImageKind::kDepth;
-  }
+  plan.keep_depth = Shows(request, ImageKind::kDepth);
   const ShadowTechnique& technique = TechniqueFor(scene.shadow.technique);
   if (absl::Status status = technique.Check(request); !status.ok()) return status;
   if (absl::Status status = technique.Plan(request, particles, plan); !status.ok()) return status;

@@ -149,6 +149,13 @@ Projection EyeProjection(const Camera& camera, const glm::ivec2& target_size, do
   return projection;
 }
 
+Projection EyeProjection(const Scene& scene, const glm::ivec2& composite_size) {
+  const Sampling& sampling = scene.sampling;
+  return EyeProjection(
+      scene.camera, composite_size,
+      static_cast<double>(sampling.supersample) / static_cast<double>(sampling.downsample));
+}
+
 glm::dvec3 ViewDirection(const Camera& camera) {
   return -glm::normalize(glm::dvec3(glm::row(camera.view_from_world, 2)));
 }

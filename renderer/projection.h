@@ -37,6 +37,9 @@ struct Projection {
 // pixel along each side (below 1: fewer samples than pixels).
 Projection EyeProjection(const Camera& camera, const glm::ivec2& target_size, double samples);
 
+// The same onto all samples of a scene's image.
+Projection EyeProjection(const Scene& scene, const glm::ivec2& composite_size);
+
 // Along which the camera looks, in the world. Unit length.
 glm::dvec3 ViewDirection(const Camera& camera);
 

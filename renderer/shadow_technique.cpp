@@ -1,5 +1,7 @@
 #include "renderer/shadow_technique.h"
 
+#include <algorithm>
+
 #include "absl/strings/str_cat.h"
 #include "renderer/projection.h"
 #include "renderer/techniques/half_angle.h"
@@ -28,6 +30,25 @@ ShadowTechniqueKind DefaultTechnique(const FrameRequest& request, bool software_
   return software_renderer && TechniqueFor(sweep).Check(request).ok()
              ? sweep
              : ShadowTechniqueKind::kHalfAngle;
+}
+
+LightReport ReportOf(const Projection& light) {
+  LightReport report;
+  report.casts_shadows = true;
+  report.light_texture_from_world = light.texture_from_world();
+  report.light_view_from_world = light.view_from_world;
+  return report;
+}
+
+bool Shows(const FrameRequest& request, ImageKind kind) {
+  return std::any_of(request.images.begin(), request.images.end(),
+                     [kind](const ImageRequest& image) { return image.kind == kind; });
+}
+
+bool ShowsOfLight(const FrameRequest& request, ImageKind kind, size_t light) {
+  return std::any_of(request.images.begin(), request.images.end(), [&](const ImageRequest& image) {
+    return image.kind == kind && image.light_index == static_cast<int>(light);
+  });
 }
 
 absl::Status CheckLightCount(const Scene& scene) {

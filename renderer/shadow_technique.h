@@ -16,6 +16,7 @@ namespace halflight {
 class FrameCache;
 struct DeviceInfo;
 struct Gpu;
+struct Projection;
 class StageClock;
 
 // Everything that a frame is drawn from. `plan` is that of the same request.
@@ -61,6 +62,13 @@ const ShadowTechnique& TechniqueFor(ShadowTechniqueKind kind);
 // otherwise half-angle slicing. On GPUs that stays so until the sweep has been measured on one.
 // `request.scene.shadow.technique` does not matter.
 ShadowTechniqueKind DefaultTechnique(const FrameRequest& request, bool software_renderer);
+
+// What a tool needs to place the buffer of a light that casts shadows.
+LightReport ReportOf(const Projection& light);
+
+// Whether an output shows this, of any light or of one.
+bool Shows(const FrameRequest& request, ImageKind kind);
+bool ShowsOfLight(const FrameRequest& request, ImageKind kind, size_t light);
 
 // What techniques refuse in the same words, as InvalidArgument. `technique` is the refusing one's
 // name in the service, such as "LIGHT_SWEEP".

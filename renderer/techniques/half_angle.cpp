@@ -179,9 +179,7 @@ absl::StatusOr<DrawnFrame> HalfAngle::Draw(const DrawContext& context) const {
   context.clock.BeginCpu("upload");
   const auto buffers = ParticlesOnDevice(context.cache, scene, context.particles);
   if (!buffers.ok()) return buffers.status();
-  const double samples = static_cast<double>(scene.sampling.supersample) /
-                         static_cast<double>(scene.sampling.downsample);
-  Projection eye_projection = EyeProjection(scene.camera, plan.composite_size, samples);
+  Projection eye_projection = EyeProjection(scene, plan.composite_size);
   eye_projection.near_eye = ReachesEyePlane(eye_projection, context.particles);
   const TargetProjection eye = UploadProjection(eye_projection, context.particles);
 

@@ -9,6 +9,7 @@
 #include "absl/strings/str_cat.h"
 #include "renderer/frame.h"
 #include "renderer/scattering.h"
+#include "renderer/shadow_technique.h"
 
 namespace halflight {
 
@@ -189,9 +190,7 @@ absl::StatusOr<ShadowResult> DrawHalfAngleLight(const TraversalContext& context,
   if (const auto& physical = context.scene.material.physical_scattering) {
     light_projection.optical_depth_scale = ForwardExtinction(*physical);
   }
-  report.casts_shadows = true;
-  report.light_texture_from_world = light_projection.texture_from_world();
-  report.light_view_from_world = light_projection.view_from_world;
+  report = ReportOf(light_projection);
   report.slice_axis = *traversal.axis;
   report.slices = traversal.slices;
   report.back_to_front = traversal.back_to_front;

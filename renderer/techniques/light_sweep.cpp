@@ -29,11 +29,6 @@ bool DrawsOnDevice(const DrawContext& context) {
   return where == SweepOn::kDevice || (where == SweepOn::kAuto && !context.device.software);
 }
 
-bool Shows(const FrameRequest& request, ImageKind kind) {
-  return std::any_of(request.images.begin(), request.images.end(),
-                     [kind](const ImageRequest& image) { return image.kind == kind; });
-}
-
 std::vector<PlannedPass> LightPasses(size_t light) {
   const std::string reason = absl::StrCat("light ", light, " casts shadows");
   return {{"sort along the light", reason, 1},
@@ -195,16 +190,12 @@ absl::StatusOr<DrawnFrame> DrawOnCpu(const DrawContext& context) {
     if (!fit.ok()) return fit.status();
     fits[l] = *std::move(fit);
     fit_of[l] = fits[l].get();
-    frame.reports[l].casts_shadows = true;
-    frame.reports[l].light_texture_from_world = fits[l]->projection.texture_from_world();
-    frame.reports[l].light_view_from_world = fits[l]->projection.view_from_world;
+    frame.reports[l] = ReportOf(fits[l]->projection);
   }
 
   // See the particles from the eye.
   clock.BeginCpu("project");
-  const double samples = static_cast<double>(scene.sampling.supersample) /
-                         static_cast<double>(scene.sampling.downsample);
-  const Projection eye = EyeProjection(scene.camera, plan.composite_size, samples);
+  const Projection eye = EyeProjection(scene, plan.composite_size);
   const SpriteListKey list_key{ParticleViewKeyOf(scene), eye, sweep::NearDepth(scene)};
   const auto list = SpritesOf(context, list_key, frame);
   if (!list.ok()) return list.status();
@@ -241,7 +232,7 @@ absl::StatusOr<DrawnFrame> DrawOnCpu(const DrawContext& context) {
       drawn.transmittance[l] = resample(composite.transmittance[static_cast<size_t>(
           sweep::TransmittanceSlot(tile_lights, static_cast<int>(l)))]);
     }
-    if (Shows(request, ImageKind::kLightBuffer)) {
+    if (ShowsOfLight(request, ImageKind::kLightBuffer, l)) {
       drawn.shadows[l].light_buffer = fits[l]->optical_depth;
     }
   }

@@ -41,12 +41,6 @@ std::vector<int> ShownSlots(const FrameRequest& request, const std::vector<TileL
   return slots;
 }
 
-bool ShowsLightBuffer(const FrameRequest& request, size_t light) {
-  return std::any_of(request.images.begin(), request.images.end(), [&](const ImageRequest& image) {
-    return image.kind == ImageKind::kLightBuffer && image.light_index == static_cast<int>(light);
-  });
-}
-
 // What the eye pass begins with.
 struct SeenScene {
   const ParticleBuffers& buffers;
@@ -148,20 +142,17 @@ absl::StatusOr<DrawnFrame> DrawOnDevice(const DrawContext& context,
         scene.shadow.light_buffer_size, scene.shadow.fit_degree, context.stop,
         LightSweepSettingsFor(context.device));
     if (!fit.ok()) return fit.status();
-    frame.reports[l].casts_shadows = true;
-    frame.reports[l].light_texture_from_world = fit->projection.texture_from_world();
-    frame.reports[l].light_view_from_world = fit->projection.view_from_world;
-    if (ShowsLightBuffer(request, l)) drawn.shadows[l].light_buffer = ReadOpticalDepth(*fit);
+    frame.reports[l] = ReportOf(fit->projection);
+    if (ShowsOfLight(request, ImageKind::kLightBuffer, l))
+      drawn.shadows[l].light_buffer = ReadOpticalDepth(*fit);
     fits[l] = *std::move(fit);
     fit_of[l] = &*fits[l];
   }
 
   // See the particles from the eye, in the light.
   context.clock.BeginGpu("project");
-  const double samples = static_cast<double>(scene.sampling.supersample) /
-                         static_cast<double>(scene.sampling.downsample);
-  const TargetProjection eye = UploadProjection(
-      EyeProjection(scene.camera, context.plan.composite_size, samples), context.particles);
+  const TargetProjection eye =
+      UploadProjection(EyeProjection(scene, context.plan.composite_size), context.particles);
   const absl::StatusOr<DeviceSprites> sprites = ListDeviceSprites(
       context.gpu, **buffers, context.particles.set().origin, eye.projection, NearDepth(scene));
   if (!sprites.ok()) return sprites.status();
