@@ -39,6 +39,10 @@ absl::StatusOr<FrameResult> FrameRenderer::Render(const FrameRequest& request,
                                                   const std::stop_token& stop) {
   StageClock clock;
   clock.BeginCpu("plan");
+  // What the request leaves to the device.
+  FrameRequest settled = request;
+  settled.scene.shadow.compositor =
+      CompositorFor(request.scene.shadow.compositor, device().software);
   const Scene& scene = request.scene;
   cache_.ForgetGoneSets();
   FrameCache nothing_kept(0);
@@ -47,12 +51,12 @@ absl::StatusOr<FrameResult> FrameRenderer::Render(const FrameRequest& request,
       cache.FindOrMake(scene.particles, ParticleViewKeyOf(scene),
                        [&]() -> absl::StatusOr<ParticleView> { return ParticleView(scene); });
   if (!particles.ok()) return particles.status();
-  absl::StatusOr<FramePlan> plan = PlanFrame(request, **particles);
+  absl::StatusOr<FramePlan> plan = PlanFrame(settled, **particles);
   if (!plan.ok()) return plan.status();
   const DrawContext context{.gpu = gpu_,
                             .device = device(),
                             .cache = cache,
-                            .request = request,
+                            .request = settled,
                             .particles = **particles,
                             .plan = *plan,
                             .clock = clock,

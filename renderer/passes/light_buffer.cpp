@@ -136,9 +136,13 @@ absl::Status BlurLightBuffer(Gpu& gpu, LightBuffer& buffer, LightBuffer& scratch
 }
 
 Image ReadLightBuffer(const LightBuffer& buffer, bool colored) {
+  return ReadLightLayer(buffer.texture, 0, colored);
+}
+
+Image ReadLightLayer(const gl::Texture& layers, int layer, bool colored) {
   Image image;
-  image.width = buffer.texture.width();
-  image.height = buffer.texture.height();
+  image.width = layers.width();
+  image.height = layers.height();
   if (colored) {
     image.channels = {"R", "G", "B"};
   } else {
@@ -147,8 +151,10 @@ Image ReadLightBuffer(const LightBuffer& buffer, bool colored) {
   image.pixels.resize(static_cast<size_t>(image.width) * static_cast<size_t>(image.height) *
                       image.channels.size());
   glPixelStorei(GL_PACK_ALIGNMENT, 1);
-  glGetTextureImage(buffer.texture.name(), 0, colored ? GL_RGB : GL_RED, GL_FLOAT,
-                    static_cast<GLsizei>(image.pixels.size() * sizeof(float)), image.pixels.data());
+  glGetTextureSubImage(layers.name(), 0, 0, 0, layer, image.width, image.height, 1,
+                       colored ? GL_RGB : GL_RED, GL_FLOAT,
+                       static_cast<GLsizei>(image.pixels.size() * sizeof(float)),
+                       image.pixels.data());
   return image;
 }
 

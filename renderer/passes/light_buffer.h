@@ -48,5 +48,7 @@ absl::Status BlurLightBuffer(Gpu& gpu, LightBuffer& buffer, LightBuffer& scratch
 
 // The optical depth as it stands; one or three channels. Waits for the device.
 Image ReadLightBuffer(const LightBuffer& buffer, bool colored);
+// The same of one layer of an array of light buffers.
+Image ReadLightLayer(const gl::Texture& layers, int layer, bool colored);
 
 }  // namespace halflight

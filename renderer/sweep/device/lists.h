@@ -54,11 +54,12 @@ absl::StatusOr<DeviceSprites> ListDeviceSprites(Gpu& gpu, const ParticleBuffers&
                                                 const glm::dvec3& origin, const Projection& target,
                                                 double near_depth = 0.0);
 
-// ListTiles() of a run of places, entry for entry the CPU's; entries are places of the whole order.
+// ListTiles() of a run of places, entry for entry the CPU's; entries are places of the whole order,
+// by whose place `rects` are (uvec2, as in DeviceSprites).
 // Waits once for the device, for the number of entries. 4 bytes an entry and a tile; 12 an entry
 // and 4 a place more while it works. ResourceExhausted where a storage block does not hold 4 bytes
 // an entry or 8 a place: shorter runs then fit. Needs a current context.
-absl::StatusOr<DeviceTiles> ListDeviceTiles(Gpu& gpu, const DeviceSprites& sprites,
+absl::StatusOr<DeviceTiles> ListDeviceTiles(Gpu& gpu, const gl::Buffer& rects,
                                             const PlaceRun& run, const glm::ivec2& target_size,
                                             int tile_size);
 
