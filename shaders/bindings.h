@@ -104,11 +104,11 @@ HALFLIGHT_CONSTANT(kSliceBeginsBinding, 3);       // uint[slices + 1]: places
 HALFLIGHT_CONSTANT(kSplatRectsBinding, 5);        // uvec2[N]
 
 // Images.
-HALFLIGHT_CONSTANT(kTileTargetBinding, 0);         // premultiplied
-HALFLIGHT_CONSTANT(kDepthTargetBinding, 1);        // depth * alpha, 0, 0, alpha
+HALFLIGHT_CONSTANT(kTileTargetBinding, 0);           // premultiplied
+HALFLIGHT_CONSTANT(kDepthTargetBinding, 1);          // depth * alpha, 0, 0, alpha
 HALFLIGHT_CONSTANT(kTransmittanceTargetBinding, 2);  // R G B * alpha, alpha
-HALFLIGHT_CONSTANT(kLightTargetBinding, 0);        // a light buffer
-HALFLIGHT_CONSTANT(kLayersTargetBinding, 1);       // an array of them
+HALFLIGHT_CONSTANT(kLightTargetBinding, 0);          // a light buffer
+HALFLIGHT_CONSTANT(kLayersTargetBinding, 1);         // an array of them
 
 // Textures.
 HALFLIGHT_CONSTANT(kLightBeforeBinding, 0);  // light buffer without the current slice

@@ -105,6 +105,12 @@ void StoreTargets(ivec2 pixel, Sum sum) {
 }
 
 void main() {
+  uint tile = WorkgroupIndex();
+  uint first = list_begin[tile] + walk.window.x;
+  uint end = min(list_begin[tile + 1u], first + walk.window.y);
+  if (end <= first) return;  // all of the workgroup
+  uint length = end - first;
+
   const Sum kNothing = Sum(vec4(0.0), 0.0, vec3(0.0));
   ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
   vec2 sample_at = vec2(pixel) + 0.5;
@@ -117,10 +123,6 @@ void main() {
   Sum run = kNothing;
   uint in_run = 0u;
 
-  uint tile = WorkgroupIndex();
-  uint first = list_begin[tile] + walk.window.x;
-  uint end = min(list_begin[tile + 1u], first + walk.window.y);
-  uint length = end > first ? end - first : 0u;
   uint turn = 0u;
   if (gl_LocalInvocationIndex == 0u) open[0] = open[1] = false;
   barrier();

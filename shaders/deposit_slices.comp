@@ -47,7 +47,7 @@ void main() {
   vec2 at = vec2(texel) + 0.5;
   vec4 sum = inside ? texelFetch(source, texel, 0) : vec4(0.0);
   uint slice = walk.slices.x;
-  uint begins_at = slice_begin[slice];
+  uint begins_at = slice < walk.slices.y ? slice_begin[slice] : 0xFFFFFFFFu;
 
   uint tile = WorkgroupIndex();
   uint end = FirstEntry(list_begin[tile], list_begin[tile + 1u], walk.window.y);
@@ -62,12 +62,15 @@ void main() {
       optical_depths[gl_LocalInvocationIndex] = splats[place].optics.x;
     }
     barrier();
-    for (uint k = 0u; k < count; ++k) {
-      while (slice < walk.slices.y && begins_at <= places[k]) {
-        if (inside) imageStore(layers, ivec3(texel, LayerBefore(slice)), sum);
-        begins_at = slice_begin[++slice];
+    for (uint k = 0u; k < count;) {
+      for (; k < count && places[k] < begins_at; ++k) {
+        sum += DepositAt(at, centers[k], optical_depths[k]);
       }
-      sum += DepositAt(at, centers[k], optical_depths[k]);
+      if (k < count) {
+        if (inside) imageStore(layers, ivec3(texel, LayerBefore(slice)), sum);
+        ++slice;
+        begins_at = slice < walk.slices.y ? slice_begin[slice] : 0xFFFFFFFFu;
+      }
     }
   }
   if (!inside) return;

@@ -156,16 +156,17 @@ void AddMaterialFlags(CLI::App& app, RenderOptions& options) {
 }
 
 void AddShadowFlags(CLI::App& app, RenderOptions& options) {
-  AddChoice<v1::ShadowTechnique>(app, "--technique", options.technique,
-                                 {{"half-angle", v1::SHADOW_TECHNIQUE_HALF_ANGLE},
-                                  {"light-sweep", v1::SHADOW_TECHNIQUE_LIGHT_SWEEP},
-                                  {"reference", v1::SHADOW_TECHNIQUE_REFERENCE}},
-                                 "How shadows are computed: by slices; along each light, on the "
-                                 "CPU; or exactly, in float64 on the CPU. Default: light-sweep on "
-                                 "servers without a GPU, unless something asks for slices "
-                                 "(--slices, --plain, --spacing, --compositor, --blur, --scattering, "
-                                 "layers); "
-                                 "otherwise half-angle");
+  AddChoice<v1::ShadowTechnique>(
+      app, "--technique", options.technique,
+      {{"half-angle", v1::SHADOW_TECHNIQUE_HALF_ANGLE},
+       {"light-sweep", v1::SHADOW_TECHNIQUE_LIGHT_SWEEP},
+       {"reference", v1::SHADOW_TECHNIQUE_REFERENCE}},
+      "How shadows are computed: by slices; along each light, on the "
+      "CPU; or exactly, in float64 on the CPU. Default: light-sweep on "
+      "servers without a GPU, unless something asks for slices "
+      "(--slices, --plain, --spacing, --compositor, --blur, --scattering, "
+      "layers); "
+      "otherwise half-angle");
   AddCount(app, "--fit-degree", options.fit_degree, 0, 6,
            "Degree in which light-sweep keeps the light over a particle; default: 4");
   AddCount(app, "--slices", options.slices, 1, INT32_MAX, "Slices of half-angle; default: 128");

@@ -88,8 +88,8 @@ struct TextureInfo {
   int layers = 0;  // of an array texture; 0: of none
 };
 
-// A bilinearly filtered 2D texture, or an array of them, without mipmaps, clamped to its edge, which
-// knows its size.
+// A bilinearly filtered 2D texture, or an array of them, without mipmaps, clamped to its edge,
+// which knows its size.
 class Texture : public Object<TextureTraits> {
  public:
   Texture() = default;

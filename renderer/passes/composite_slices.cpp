@@ -23,7 +23,8 @@ size_t MostEntries(const CompositePass& pass, const LayeredLight* light,
                    const sweep::TileWalk& walk) {
   const auto invocations = static_cast<size_t>(walk.tile_size) * walk.tile_size;
   const size_t slices = light != nullptr ? light->run.end - light->run.first : 1;
-  const size_t loads = gl::DivideUp(shader::kSliceChunk, invocations) * (1 + std::bit_width(slices));
+  const size_t loads =
+      gl::DivideUp(shader::kSliceChunk, invocations) * (1 + std::bit_width(slices));
   const size_t lights = pass.constants.at(shader::kVaryingLightsConstant);
   const size_t chunk = 1 + loads + shader::kSliceChunk * (1 + lights);
   return std::max<size_t>(walk.most_iterations / chunk, 1) * shader::kSliceChunk;

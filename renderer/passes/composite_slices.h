@@ -19,9 +19,9 @@ struct LayeredLight {
   SliceRun run;                    // that the layers hold
 };
 
-// Composites the places that `tiles` lists, which have the walk's size, into the target: in front of
-// what it holds, or behind, as the pass says. `light` is null without shadows. Cancelled when `stop`
-// says so.
+// Composites the places that `tiles` lists, which have the walk's size, into the target: in front
+// of what it holds, or behind, as the pass says. `light` is null without shadows. Cancelled when
+// `stop` says so.
 absl::Status CompositeSlices(Gpu& gpu, const CompositePass& pass, const sweep::DeviceTiles& tiles,
                              const sweep::PlaceRun& places, const LayeredLight* light,
                              const sweep::TileWalk& walk, const CompositeTarget& target,

@@ -151,10 +151,9 @@ Image ReadLightLayer(const gl::Texture& layers, int layer, bool colored) {
   image.pixels.resize(static_cast<size_t>(image.width) * static_cast<size_t>(image.height) *
                       image.channels.size());
   glPixelStorei(GL_PACK_ALIGNMENT, 1);
-  glGetTextureSubImage(layers.name(), 0, 0, 0, layer, image.width, image.height, 1,
-                       colored ? GL_RGB : GL_RED, GL_FLOAT,
-                       static_cast<GLsizei>(image.pixels.size() * sizeof(float)),
-                       image.pixels.data());
+  glGetTextureSubImage(
+      layers.name(), 0, 0, 0, layer, image.width, image.height, 1, colored ? GL_RGB : GL_RED,
+      GL_FLOAT, static_cast<GLsizei>(image.pixels.size() * sizeof(float)), image.pixels.data());
   return image;
 }
 

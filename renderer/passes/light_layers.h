@@ -26,8 +26,8 @@ struct LightLayers {
   size_t slices = 0;  // that it holds
 };
 
-// For `slices` slices, or as many of them as take no more than `most_bytes` and the device's layers,
-// but at least one.
+// For `slices` slices, or as many of them as take no more than `most_bytes` and the device's
+// layers, but at least one.
 LightLayers MakeLightLayers(int size, const LightChannels& channels, size_t step, size_t slices,
                             size_t most_bytes);
 
@@ -46,9 +46,9 @@ size_t MostPlacesOfDeposit(const sweep::TileWalk& walk);
 
 // Adds the places to what `from` holds, in their order, into `to`: sums are those of DepositSlice,
 // bit for bit where blending adds float32 in order. Of `slices`, those that begin at these places,
-// each gets what was there before it into its layer of `layers`, whose first slice is `first_slice`;
-// the last slice that has begun, what is there at the end into the layer after its own. `tiles` are
-// lists that have these places.
+// each gets what was there before it into its layer of `layers`, whose first slice is
+// `first_slice`; the last slice that has begun, what is there at the end into the layer after its
+// own. `tiles` are lists that have these places.
 absl::Status DepositPlaces(Gpu& gpu, const DepositPass& pass, const sweep::DeviceTiles& tiles,
                            const sweep::PlaceRun& places, const SliceRun& slices,
                            size_t first_slice, const LightBuffer& from, const LightBuffer& to,

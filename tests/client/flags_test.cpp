@@ -198,8 +198,9 @@ TEST(RenderFlags, TargetAndSettingsTakeEachOthersPlace) {
   ExpectJson(
       RequestOf({"--size", "10x10"}, *target),
       R"({"scene": {"camera": {"width": 10, "height": 10}}, "target": {"max_error": 0.05}})");
-  for (const char* flag : {"--technique=reference", "--slices=7", "--plain", "--spacing=count",
-                           "--compositor=tiles", "--light-buffer=64", "--blur=distance", "--blur-texels=2"}) {
+  for (const char* flag :
+       {"--technique=reference", "--slices=7", "--plain", "--spacing=count", "--compositor=tiles",
+        "--light-buffer=64", "--blur=distance", "--blur-texels=2"}) {
     const std::string name = std::string(flag).substr(0, std::string(flag).find('='));
     EXPECT_THAT(ErrorOf({flag, "--max-error", "0.05"}),
                 testing::AllOf(HasSubstr(name), HasSubstr("--max-error")));

@@ -1,9 +1,9 @@
-// Slices by tiles in compute against the same slices through the blend units: the order is the same,
-// and so is what a particle adds; what remains is the rounding of sums.
-#include <gmock/gmock.h>
+// Slices by tiles in compute against the same slices through the blend units: the order is the
+// same, and so is what a particle adds; what remains is the rounding of sums.
 #include <gtest/gtest.h>
 
-#include <iostream>
+#include <algorithm>
+#include <cmath>
 #include <memory>
 #include <string>
 
@@ -11,10 +11,6 @@
 
 namespace halflight {
 namespace {
-
-using ::testing::Contains;
-using ::testing::Field;
-using ::testing::Not;
 
 // Sums of a few hundred layers in float32, added one by one or in runs.
 constexpr double kRounding = 2e-5;
@@ -73,7 +69,6 @@ TEST_P(SlicesInTilesOf, AreWhatBlendingDraws) {
       const double scale = std::max(1.0, std::abs(static_cast<double>(expected.pixels[k])));
       largest = std::max(largest, std::abs(image.pixels[k] - expected.pixels[k]) / scale);
     }
-    std::cout << GetParam().name << ", output " << i << ": " << largest << "\n";
     EXPECT_LT(largest, kRounding) << "output " << i;
   }
   EXPECT_GT(test::PixelAt(tiles.images[0], 75, 65)[3], 0.3F);
@@ -83,7 +78,10 @@ INSTANTIATE_TEST_SUITE_P(
     Scenes, SlicesInTilesOf,
     testing::Values(
         SliceCase{"FrontToBack", [](Scene&) {}},
-        SliceCase{"BackToFront", [](Scene& s) { s.lights = {test::Sun({0.3, -0.4, 1})}; }},
+        SliceCase{"BackToFront",
+                  [](Scene& s) {
+                    s.lights = {test::Sun({0.3, -0.4, 1})};
+                  }},
         SliceCase{"Plain", [](Scene& s) { s.shadow.interpolate = false; }},
         SliceCase{"PlainBackToFront",
                   [](Scene& s) {
@@ -95,10 +93,11 @@ INSTANTIATE_TEST_SUITE_P(
                     s.lights = {WithDensity(test::Sun({1, -0.6, -0.6}), {0.3F, 1.0F, 2.0F})};
                   }},
         SliceCase{"PointLight",
-                  [](Scene& s) { s.lights.front().kind = PointLight{{2, 3, 1.5}, true}; }},
+                  [](Scene& s) {
+                    s.lights.front().kind = PointLight{{2, 3, 1.5}, true};
+                  }},
         SliceCase{"PhaseFunction", [](Scene& s) { s.material.phase_g = 0.6F; }},
-        SliceCase{"Orthographic",
-                  [](Scene& s) { s.camera.projection = Orthographic{2.6}; }},
+        SliceCase{"Orthographic", [](Scene& s) { s.camera.projection = Orthographic{2.6}; }},
         SliceCase{"Balls", [](Scene& s) { s.material.profile = Profile::kBall; }},
         SliceCase{"VariedByOpticalDepth",
                   [](Scene& s) {
@@ -132,7 +131,9 @@ INSTANTIATE_TEST_SUITE_P(
                     s.lights = {WithDensity(test::Sun({0.3, -0.4, 1}), {0.3F, 1.0F, 2.0F})};
                   }},
         SliceCase{"PhysicallyScattered",
-                  [](Scene& s) { s.material.physical_scattering = PhysicalScattering{0.7F, 0.9F}; }},
+                  [](Scene& s) {
+                    s.material.physical_scattering = PhysicalScattering{0.7F, 0.9F};
+                  }},
         SliceCase{"PhysicallyScatteredInColour",
                   [](Scene& s) {
                     s.material.physical_scattering = PhysicalScattering{0.7F, 0.9F};
@@ -140,6 +141,73 @@ INSTANTIATE_TEST_SUITE_P(
                   }},
         SliceCase{"Supersampled", [](Scene& s) { s.sampling.supersample = 2; }}),
     [](const auto& instance) { return instance.param.name; });
+
+// Nine light buffers of 16 MiB do not fit into one run's layers.
+TEST_F(SlicesInTiles, GoInRunsOfAsManySlicesAsLayersHold) {
+  for (const bool blurred : {false, true}) {
+    for (const glm::dvec3& direction : {glm::dvec3(1, -1, -0.5), glm::dvec3(0.3, -0.4, 1)}) {
+      FrameRequest request = test::Beauty(test::BallScene(200, 64));
+      request.scene.lights = {test::Sun(direction)};
+      request.scene.shadow.slices = 9;
+      request.scene.shadow.light_buffer_size = 2048;
+      if (blurred) request.scene.material.scattering_spread = 0.002F;
+      const Image raster = RenderBy(SliceCompositor::kRaster, request).images.at(0);
+      const Image tiles = RenderBy(SliceCompositor::kTiles, request).images.at(0);
+      EXPECT_LT(test::MaxDifference(tiles, raster), kRounding)
+          << "blurred " << blurred << ", light along z " << direction.z;
+    }
+  }
+}
+
+// More of them in one tile than one dispatch may loop over on a CPU, of the image and of the light
+// buffer; each adds less than float32 keeps of a sum near 1.
+TEST_F(SlicesInTiles, AddThinLayersUp) {
+  constexpr int kCount = 150'000;
+  constexpr float kOpacity = 1e-5F;
+  Scene scene = test::BallScene(0, 16);
+  auto set = std::make_shared<ParticleSet>();
+  for (int i = 0; i < kCount; ++i) {
+    set->positions.emplace_back(0.0F, 0.0F, static_cast<float>(i) * 1e-6F);
+  }
+  scene.particles = set;
+  scene.camera.projection = Orthographic{2.0};
+  scene.material.radius = 1.0F;
+  scene.material.opacity = kOpacity;
+  scene.shadow.light_buffer_size = 16;
+  for (const double along_view : {-1.0, 1.0}) {
+    scene.lights = {test::Sun({0, 0, along_view})};
+    FrameRequest request = test::Beauty(scene);
+    request.images.push_back({ImageKind::kLightBuffer, 0, LightQuantity::kOpticalDepth});
+    const FrameResult frame = RenderBy(SliceCompositor::kTiles, request);
+    // The middle of the pixel, in radii.
+    const double rho_squared = 2.0 * (0.5 / 8.0) * (0.5 / 8.0);
+    const double optical_depth = -std::log1p(-static_cast<double>(kOpacity)) * kCount;
+    EXPECT_NEAR(test::PixelAt(frame.images[0], 8, 8)[3],
+                1.0 - std::exp(-optical_depth * (1.0 - rho_squared)), 5e-6)
+        << along_view;
+    const Image& light = frame.images[1];
+    EXPECT_GT(*std::max_element(light.pixels.begin(), light.pixels.end()), 0.95 * optical_depth)
+        << along_view;
+  }
+}
+
+TEST_F(SlicesInTiles, AreDrawnWhereTheRequestAsksOrTheDeviceIsAGpu) {
+  FrameRequest request = test::Beauty(test::BallScene(100, 16));
+  const auto in_tiles = [&](SliceCompositor compositor) {
+    const FrameResult frame = RenderBy(compositor, request);
+    return frame.plan.traversals.at(0).in_tiles;
+  };
+  EXPECT_FALSE(in_tiles(SliceCompositor::kRaster));
+  EXPECT_TRUE(in_tiles(SliceCompositor::kTiles));
+  EXPECT_EQ(in_tiles(SliceCompositor::kAuto), !Renderer().device().software);
+}
+
+TEST_F(SlicesInTiles, OfNothingShowNothing) {
+  FrameRequest request = test::Beauty(test::BallScene(0, 16));
+  request.images.push_back({ImageKind::kLightLayers, 0});
+  const FrameResult frame = RenderBy(SliceCompositor::kTiles, request);
+  for (const float value : frame.images.at(0).pixels) EXPECT_EQ(value, 0.0F);
+}
 
 }  // namespace
 }  // namespace halflight

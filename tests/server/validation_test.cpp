@@ -279,9 +279,7 @@ INSTANTIATE_TEST_SUITE_P(
                 [](Request& r) { ShadowOf(r).set_technique(v1::SHADOW_TECHNIQUE_REFERENCE); },
                 "scene.shadow.technique: SHADOW_TECHNIQUE_REFERENCE of "},
         Refusal{"CompositorUnknown",
-                [](Request& r) {
-                  ShadowOf(r).set_compositor(static_cast<v1::SliceCompositor>(7));
-                },
+                [](Request& r) { ShadowOf(r).set_compositor(static_cast<v1::SliceCompositor>(7)); },
                 "scene.shadow.compositor: 7, allowed: SLICE_COMPOSITOR_RASTER, "
                 "SLICE_COMPOSITOR_TILES"},
         Refusal{"SpacingUnknown",

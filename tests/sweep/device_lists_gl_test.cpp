@@ -229,8 +229,8 @@ TEST_P(ListDeviceSpritesOf, HasTheTilesOfTheCpu) {
   for (const int tile_size : {8, 64, 128}) {
     const TileLists expected = ListTiles(rects, cloud.target.size, tile_size);
     const DeviceTiles uploaded = UploadTiles(expected);
-    const absl::StatusOr<DeviceTiles> lists =
-        ListDeviceTiles(Device(), sprites->rects, {0, sprites->count}, cloud.target.size, tile_size);
+    const absl::StatusOr<DeviceTiles> lists = ListDeviceTiles(
+        Device(), sprites->rects, {0, sprites->count}, cloud.target.size, tile_size);
     ASSERT_TRUE(lists.ok()) << lists.status();
     EXPECT_EQ(lists->tiles, uploaded.tiles);
     EXPECT_EQ(lists->tile_size, tile_size);

@@ -59,9 +59,8 @@ absl::Status CompositeRuns(const DrawContext& context, const SeenScene& seen, si
   for (size_t first = 0; first < seen.sprites.count;) {
     const PlaceRun run{first, std::min(first + most, seen.sprites.count)};
     context.clock.BeginGpu("project");
-    absl::StatusOr<DeviceTiles> tiles =
-        ListDeviceTiles(context.gpu, seen.sprites.rects, run, seen.eye.projection.size,
-                        walk.tile_size);
+    absl::StatusOr<DeviceTiles> tiles = ListDeviceTiles(context.gpu, seen.sprites.rects, run,
+                                                        seen.eye.projection.size, walk.tile_size);
     if (absl::IsResourceExhausted(tiles.status()) && most > kShadedAlignment) {
       most = std::max<size_t>(most / 2 / kShadedAlignment, 1) * kShadedAlignment;
       continue;

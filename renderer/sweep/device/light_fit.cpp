@@ -77,9 +77,8 @@ absl::Status SweepAndFit(Gpu& gpu, const LightPasses& passes, const TargetProjec
                          const DeviceLightFit& fit, const std::stop_token& stop) {
   for (const PatchRun& run : passes.patch_runs.runs) {
     if (stop.stop_requested()) return absl::CancelledError("frame cancelled");
-    absl::StatusOr<DeviceTiles> tiles =
-        ListDeviceTiles(gpu, passes.sprites.rects, run.places, target.projection.size,
-                        passes.light_tile);
+    absl::StatusOr<DeviceTiles> tiles = ListDeviceTiles(gpu, passes.sprites.rects, run.places,
+                                                        target.projection.size, passes.light_tile);
     if (!tiles.ok()) return tiles.status();
     const gl::Buffer block = BindRun(run, target.projection.size.x);
     glBindBufferBase(GL_UNIFORM_BUFFER, shader::kProjectionBinding, target.block.name());

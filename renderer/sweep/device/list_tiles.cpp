@@ -54,15 +54,13 @@ absl::Status Run(Gpu& gpu, const gl::ProgramSource& source, const shader::TilesB
 void BindRects(const gl::Buffer& rects, const PlaceRun& run, shader::TilesBlock& block) {
   const size_t first = run.first / kAlignedPlaces * kAlignedPlaces;
   block.run = {run.first - first, run.end - run.first, run.first, 0U};
-  gl::BindStorage(shader::kTileRectsBinding, rects, sizeof(glm::uvec2),
-                  {first, run.end - first});
+  gl::BindStorage(shader::kTileRectsBinding, rects, sizeof(glm::uvec2), {first, run.end - first});
 }
 
 }  // namespace
 
-absl::StatusOr<DeviceTiles> ListDeviceTiles(Gpu& gpu, const gl::Buffer& rects,
-                                            const PlaceRun& run, const glm::ivec2& target_size,
-                                            int tile_size) {
+absl::StatusOr<DeviceTiles> ListDeviceTiles(Gpu& gpu, const gl::Buffer& rects, const PlaceRun& run,
+                                            const glm::ivec2& target_size, int tile_size) {
   const gl::DebugScope scope("list tiles");
   const size_t places = run.end - run.first;
   DeviceTiles lists;

@@ -59,9 +59,8 @@ absl::StatusOr<DeviceSprites> ListDeviceSprites(Gpu& gpu, const ParticleBuffers&
 // Waits once for the device, for the number of entries. 4 bytes an entry and a tile; 12 an entry
 // and 4 a place more while it works. ResourceExhausted where a storage block does not hold 4 bytes
 // an entry or 8 a place: shorter runs then fit. Needs a current context.
-absl::StatusOr<DeviceTiles> ListDeviceTiles(Gpu& gpu, const gl::Buffer& rects,
-                                            const PlaceRun& run, const glm::ivec2& target_size,
-                                            int tile_size);
+absl::StatusOr<DeviceTiles> ListDeviceTiles(Gpu& gpu, const gl::Buffer& rects, const PlaceRun& run,
+                                            const glm::ivec2& target_size, int tile_size);
 
 // Copy lists made on the CPU. Need a current context.
 DeviceSprites UploadSprites(const SpriteList& list);
