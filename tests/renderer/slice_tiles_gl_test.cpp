@@ -150,7 +150,10 @@ TEST_F(SlicesInTiles, GoInRunsOfAsManySlicesAsLayersHold) {
       request.scene.lights = {test::Sun(direction)};
       request.scene.shadow.slices = 9;
       request.scene.shadow.light_buffer_size = 2048;
-      if (blurred) request.scene.material.scattering_spread = 0.002F;
+      if (blurred) {
+        request.scene.shadow.blur_mode = BlurMode::kTexelsPerSlice;
+        request.scene.shadow.blur_texels = 0.5F;
+      }
       const Image raster = RenderBy(SliceCompositor::kRaster, request).images.at(0);
       const Image tiles = RenderBy(SliceCompositor::kTiles, request).images.at(0);
       EXPECT_LT(test::MaxDifference(tiles, raster), kRounding)
