@@ -1,16 +1,17 @@
 #include "renderer/sweep/device/frame.h"
 
 #include <algorithm>
+#include <memory>
 #include <optional>
 #include <utility>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "renderer/frame_engine.h"
-#include "renderer/frame_images.h"
 #include "renderer/gl/compute.h"
 #include "renderer/gl/debug.h"
 #include "renderer/passes/resolve.h"
+#include "renderer/readback.h"
 #include "renderer/stage_clock.h"
 #include "renderer/sweep/device/compositor.h"
 #include "renderer/sweep/device/light_fit.h"
@@ -79,36 +80,39 @@ absl::Status CompositeRuns(const DrawContext& context, const SeenScene& seen, si
   return absl::OkStatus();
 }
 
-// Reads a target back, resolved to the image's size where sampling asks for it.
-absl::StatusOr<Image> ReadResolved(const DrawContext& context, const gl::Texture& samples) {
+// Has a target read back, resolved to the image's size where sampling asks for it.
+absl::Status ReadResolved(const DrawContext& context, const gl::Texture& samples,
+                          Readback& readback, Image& image) {
   const Sampling& sampling = context.request.scene.sampling;
-  if (sampling.supersample == 1 && sampling.downsample == 1) return ReadTexture(samples);
   const glm::ivec2& window = context.plan.window_size;
+  image = {window.x, window.y, 1, {"R", "G", "B", "A"}, {}};
+  if (sampling.supersample == 1 && sampling.downsample == 1) {
+    readback.Copy(samples, {image});
+    return absl::OkStatus();
+  }
   const glm::ivec2& composite = context.plan.composite_size;
   const Band whole{{0, 0, window.x, window.y}, {0, 0, composite.x, composite.y}};
   absl::StatusOr<gl::Texture> pixels =
       ResolveSamples(context.gpu, samples, sampling, whole, composite);
   if (!pixels.ok()) return pixels.status();
-  return ReadTexture(*pixels);
+  readback.Copy(*pixels, {image});
+  return absl::OkStatus();
 }
 
 absl::Status ReadTargets(const DrawContext& context, const std::vector<TileLight>& lights,
-                         const TileTargets& targets, DrawnImages& drawn) {
-  absl::StatusOr<Image> beauty = ReadResolved(context, targets.beauty);
-  if (!beauty.ok()) return beauty.status();
-  drawn.beauty = *std::move(beauty);
+                         const TileTargets& targets, ArrivingImages& arriving) {
+  DrawnImages& drawn = arriving.drawn;
+  arriving.readback.BeginStage(context.clock);
+  absl::Status status = ReadResolved(context, targets.beauty, arriving.readback, drawn.beauty);
   if (targets.depth) {
-    absl::StatusOr<Image> depth = ReadResolved(context, targets.depth);
-    if (!depth.ok()) return depth.status();
-    drawn.depth = *std::move(depth);
+    status.Update(ReadResolved(context, targets.depth, arriving.readback, drawn.depth));
   }
   for (size_t slot = 0; slot < targets.transmittance.size(); ++slot) {
     if (!targets.transmittance[slot]) continue;
-    absl::StatusOr<Image> transmittance = ReadResolved(context, targets.transmittance[slot]);
-    if (!transmittance.ok()) return transmittance.status();
-    drawn.transmittance[static_cast<size_t>(lights[slot].light)] = *std::move(transmittance);
+    status.Update(ReadResolved(context, targets.transmittance[slot], arriving.readback,
+                               drawn.transmittance[static_cast<size_t>(lights[slot].light)]));
   }
-  return absl::OkStatus();
+  return status;
 }
 
 }  // namespace
@@ -119,11 +123,11 @@ absl::StatusOr<DrawnFrame> DrawOnDevice(const DrawContext& context,
   const Scene& scene = request.scene;
   const size_t lights = scene.lights.size();
   if (absl::Status status = CheckTargetSize(context); !status.ok()) return status;
-  gl::ForgetErrors();
-  DrawnImages drawn;
+  DrawnFrame frame;
+  frame.arriving = std::make_unique<ArrivingImages>(context.staging);
+  DrawnImages& drawn = frame.arriving->drawn;
   drawn.transmittance.resize(lights);
   drawn.shadows.resize(lights);
-  DrawnFrame frame;
   frame.reports.resize(lights);
 
   // Bring the particles to the device.
@@ -143,8 +147,9 @@ absl::StatusOr<DrawnFrame> DrawOnDevice(const DrawContext& context,
         LightSweepSettingsFor(context.device));
     if (!fit.ok()) return fit.status();
     frame.reports[l] = ReportOf(fit->projection);
-    if (ShowsOfLight(request, ImageKind::kLightBuffer, l))
-      drawn.shadows[l].light_buffer = ReadOpticalDepth(*fit);
+    if (ShowsOfLight(request, ImageKind::kLightBuffer, l)) {
+      ReadOpticalDepth(*fit, frame.arriving->readback, drawn.shadows[l].light_buffer);
+    }
     fits[l] = *std::move(fit);
     fit_of[l] = &*fits[l];
   }
@@ -165,12 +170,9 @@ absl::StatusOr<DrawnFrame> DrawOnDevice(const DrawContext& context,
                                       settings.most_run_bytes, targets);
   if (!status.ok()) return status;
 
-  context.clock.BeginCpu("readback");
-  status = ReadTargets(context, layout.lights, targets, drawn);
+  status = ReadTargets(context, layout.lights, targets, *frame.arriving);
+  status.Update(gl::CheckErrors("frame"));
   if (!status.ok()) return status;
-  if (status = gl::CheckErrors("frame"); !status.ok()) return status;
-  context.clock.BeginCpu("images");
-  frame.images = SelectImages(request, std::move(drawn));
   return frame;
 }
 

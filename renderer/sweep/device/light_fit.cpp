@@ -165,15 +165,9 @@ absl::StatusOr<DeviceLightFit> FitLightOnDevice(Gpu& gpu, const Light& light,
   return fit;
 }
 
-Image ReadOpticalDepth(const DeviceLightFit& fit) {
-  const glm::ivec2 size = fit.projection.size;
-  Image image{size.x, size.y, 1, {"Y"}, {}};
-  image.pixels.resize(static_cast<size_t>(size.x) * size.y);
-  glMemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
-  glGetNamedBufferSubData(fit.optical_depth.name(), 0,
-                          static_cast<GLsizeiptr>(image.pixels.size() * sizeof(float)),
-                          image.pixels.data());
-  return image;
+void ReadOpticalDepth(const DeviceLightFit& fit, Readback& readback, Image& image) {
+  image = {fit.projection.size.x, fit.projection.size.y, 1, {"Y"}, {}};
+  readback.Copy(fit.optical_depth, image);
 }
 
 }  // namespace halflight::sweep

@@ -26,6 +26,7 @@
 #include "renderer/image.h"
 #include "renderer/particle_view.h"
 #include "renderer/projection.h"
+#include "renderer/readback.h"
 #include "renderer/scene.h"
 #include "renderer/sweep/device/lists.h"
 #include "renderer/sweep/device/patch_runs.h"
@@ -58,7 +59,8 @@ absl::StatusOr<DeviceLightFit> FitLightOnDevice(Gpu& gpu, const Light& light,
                                                 const std::stop_token& stop,
                                                 const LightSweepSettings& settings = {});
 
-// The optical depth behind all particles, as LightFit has it. Waits for the device.
-Image ReadOpticalDepth(const DeviceLightFit& fit);
+// The optical depth behind all particles, as LightFit has it: what `image` becomes once what
+// `readback` reads has arrived.
+void ReadOpticalDepth(const DeviceLightFit& fit, Readback& readback, Image& image);
 
 }  // namespace halflight::sweep
