@@ -63,6 +63,7 @@ absl::StatusOr<std::unique_ptr<FrameRenderer::Begun>> FrameRenderer::Begin(Frame
 }
 
 absl::Status FrameRenderer::Record(Begun& frame) {
+  gl::ForgetErrors();
   frame.clock.BeginCpu("plan");
   const Scene& scene = frame.request.scene;
   cache_.ForgetGoneSets();

@@ -26,7 +26,7 @@ struct FrameRendererOptions {
   // nothing is reused.
   size_t max_reuse_bytes = size_t{1} << 30U;
   // Largest side of a render target or a light buffer, where it is less than the device's; at
-  // least 16.
+  // least 64.
   int max_texture_size = std::numeric_limits<int>::max();
   // Of which one is read back while the device draws the others; one: every frame is read back as
   // soon as it is drawn. 0: two on GPUs, one on CPU rasterisers, which draw when told to.
