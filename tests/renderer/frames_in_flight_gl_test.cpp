@@ -218,7 +218,7 @@ TEST_P(FramesInFlight, MayBeDroppedAtAnyTime) {
   }
 }
 
-TEST_P(FramesInFlight, AreTimedEachByItself) {
+TEST_P(FramesInFlight, ReportTheirOwnStages) {
   const auto renderer = MakeRenderer(GetParam());
   const FrameRequest request = test::Beauty(SceneOf(ShadowTechniqueKind::kHalfAngle, 96));
   auto first = renderer->Begin(request, {});
