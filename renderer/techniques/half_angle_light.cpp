@@ -98,7 +98,7 @@ struct LightBuffers {
 
 // Slice by slice, through the blend units: deposits it, draws it, blurs.
 absl::Status DrawSlicesByBlending(const TraversalContext& context, const SlicedLight& sliced,
-                                  ShadowResult& result) {
+                                  ShadowResult& shadow) {
   const Traversal& traversal = context.traversal;
   const DeviceOrder& order = sliced.order;
   Gpu& gpu = context.gpu;
@@ -107,7 +107,9 @@ absl::Status DrawSlicesByBlending(const TraversalContext& context, const SlicedL
   const auto blur = [&](double from, double to) {
     return sliced.blur(from, to, buffers.before, buffers.scratch);
   };
-  for (size_t s = 0; s + 1 < order.slice_begin.size(); ++s) {
+  const size_t slices = order.slice_begin.size() - 1;
+  shadow.light_layers = DescribeLightImage(traversal, static_cast<int>(slices));
+  for (size_t s = 0; s < slices; ++s) {
     if (context.stop.stop_requested()) return absl::CancelledError("frame cancelled");
     const uint32_t begin = order.slice_begin[s];
     const uint32_t end = order.slice_begin[s + 1];
@@ -139,8 +141,8 @@ absl::Status DrawSlicesByBlending(const TraversalContext& context, const SlicedL
     }
     if (!status.ok()) return status;
     if (traversal.keep_layers) {
-      AppendLayer(ReadLightBuffer(buffers.before, traversal.colored_light_buffer),
-                  result.light_layers);
+      context.readback.Copy(buffers.before.texture,
+                            {.image = shadow.light_layers, .layer = static_cast<int>(s)});
     }
   }
   if (traversal.keep_light_buffer) {
@@ -151,7 +153,8 @@ absl::Status DrawSlicesByBlending(const TraversalContext& context, const SlicedL
         return status;
       }
     }
-    result.light_buffer = ReadLightBuffer(buffers.before, traversal.colored_light_buffer);
+    shadow.light_buffer = DescribeLightImage(traversal, 1);
+    context.readback.Copy(buffers.before.texture, {shadow.light_buffer});
   }
   return absl::OkStatus();
 }
@@ -221,8 +224,8 @@ std::vector<PlannedPass> DescribeHalfAnglePasses(const Traversal& traversal) {
   return passes;
 }
 
-absl::StatusOr<ShadowResult> DrawHalfAngleLight(const TraversalContext& context,
-                                                LightReport& report) {
+absl::Status DrawHalfAngleLight(const TraversalContext& context, LightReport& report,
+                                ShadowResult& shadow) {
   const Traversal& traversal = context.traversal;
   const Light& source = context.scene.lights[static_cast<size_t>(*traversal.shadow_light)];
   Gpu& gpu = context.gpu;
@@ -277,11 +280,8 @@ absl::StatusOr<ShadowResult> DrawHalfAngleLight(const TraversalContext& context,
                                    source.shadow_density, ChannelsOf(traversal));
           },
   };
-  ShadowResult result;
-  absl::Status status = traversal.in_tiles ? DrawSlicesInTiles(context, sliced, result)
-                                           : DrawSlicesByBlending(context, sliced, result);
-  if (!status.ok()) return status;
-  return result;
+  return traversal.in_tiles ? DrawSlicesInTiles(context, sliced, shadow)
+                            : DrawSlicesByBlending(context, sliced, shadow);
 }
 
 }  // namespace halflight

@@ -58,15 +58,16 @@ class LightWalk {
     return absl::OkStatus();
   }
 
-  // Valid after the last run: the light behind all particles.
-  absl::StatusOr<Image> ReadBehindAll() {
+  // Valid after the last run: has the light behind all particles read back.
+  absl::Status KeepBehindAll(Image& kept) {
     if (context_.traversal.blur) {
       // The buffer stands at the middle of the last slice.
       absl::Status status = sliced_.blur(sliced_.order.slice_position.back(),
                                          sliced_.order.end_position, buffer_, next_);
       if (!status.ok()) return status;
     }
-    return ReadLightBuffer(buffer_, sliced_.channels.colored);
+    context_.readback.Copy(buffer_.texture, {kept});
+    return absl::OkStatus();
   }
 
   [[nodiscard]] const LightLayers& layers() const { return layers_; }
@@ -158,11 +159,13 @@ absl::Status CompositePlaces(const TraversalContext& context, const CompositePas
   return absl::OkStatus();
 }
 
-// The light behind each slice of a run.
-void KeepLayers(const LightWalk& light, const SliceRun& run, bool colored, Image& kept) {
+// Has the light behind each slice of a run read back.
+void KeepLayers(const TraversalContext& context, const LightWalk& light, const SliceRun& run,
+                Image& kept) {
   for (size_t s = run.first; s < run.end; ++s) {
     const auto layer = static_cast<int>((s - run.first) * light.layers().step + 1);
-    AppendLayer(ReadLightLayer(light.layers().texture, layer, colored), kept);
+    context.readback.Copy(light.layers().texture, {.image = kept, .layer = static_cast<int>(s)},
+                          layer);
   }
 }
 
@@ -171,7 +174,7 @@ void KeepLayers(const LightWalk& light, const SliceRun& run, bool colored, Image
 PlannedPass DescribeCompositeInTiles() { return {"composite slices in tiles", "the image", 1}; }
 
 absl::Status DrawSlicesInTiles(const TraversalContext& context, const SlicedLight& sliced,
-                               ShadowResult& result) {
+                               ShadowResult& shadow) {
   const Traversal& traversal = context.traversal;
   const std::vector<uint32_t>& begins = sliced.order.slice_begin;
   const size_t slices = begins.size() - 1;
@@ -179,25 +182,21 @@ absl::Status DrawSlicesInTiles(const TraversalContext& context, const SlicedLigh
   if (absl::Status status = light.FindRects(); !status.ok()) return status;
   const absl::StatusOr<std::vector<SplatRects>> eye_rects = FindEyeRects(context, sliced.composite);
   if (!eye_rects.ok()) return eye_rects.status();
+  shadow.light_layers = DescribeLightImage(traversal, static_cast<int>(slices));
   for (SliceRun run; run.first < slices; run.first = run.end) {
     run.end = std::min(run.first + light.layers().slices, slices);
     context.clock.BeginGpu("light");
     if (absl::Status status = light.Run(run); !status.ok()) return status;
-    if (traversal.keep_layers) {
-      KeepLayers(light, run, sliced.channels.colored, result.light_layers);
-    }
+    if (traversal.keep_layers) KeepLayers(context, light, run, shadow.light_layers);
     context.clock.BeginGpu("composite");
     const LayeredLight layered{light.layers(), light.slice_begins(), run};
     absl::Status status = CompositePlaces(context, sliced.composite, *eye_rects,
                                           {begins[run.first], begins[run.end]}, &layered);
     if (!status.ok()) return status;
   }
-  if (traversal.keep_light_buffer) {
-    absl::StatusOr<Image> behind_all = light.ReadBehindAll();
-    if (!behind_all.ok()) return behind_all.status();
-    result.light_buffer = *std::move(behind_all);
-  }
-  return absl::OkStatus();
+  if (!traversal.keep_light_buffer) return absl::OkStatus();
+  shadow.light_buffer = DescribeLightImage(traversal, 1);
+  return light.KeepBehindAll(shadow.light_buffer);
 }
 
 absl::Status DrawUnshadowedInTiles(const TraversalContext& context,
@@ -208,13 +207,10 @@ absl::Status DrawUnshadowedInTiles(const TraversalContext& context,
   return CompositePlaces(context, composite, *rects, {0, composite.order.count()}, nullptr);
 }
 
-void AppendLayer(Image layer, Image& layers) {
-  if (layers.pixels.empty()) {
-    layers = std::move(layer);
-    return;
-  }
-  layers.pixels.insert(layers.pixels.end(), layer.pixels.begin(), layer.pixels.end());
-  ++layers.layers;
+Image DescribeLightImage(const Traversal& traversal, int layers) {
+  Image image{traversal.light_buffer_size, traversal.light_buffer_size, layers, {"Y"}, {}};
+  if (traversal.colored_light_buffer) image.channels = {"R", "G", "B"};
+  return image;
 }
 
 }  // namespace halflight

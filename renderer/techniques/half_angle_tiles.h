@@ -36,12 +36,12 @@ PlannedPass DescribeCompositeInTiles();
 // Draws the traversal's slices into the context's targets. Cancelled when the context's stop token
 // says so. Needs the GL context.
 absl::Status DrawSlicesInTiles(const TraversalContext& context, const SlicedLight& sliced,
-                               ShadowResult& result);
+                               ShadowResult& shadow);
 
 // Draws a traversal that casts no shadows.
 absl::Status DrawUnshadowedInTiles(const TraversalContext& context, const CompositePass& composite);
 
-// Appends a layer of a light buffer to an image of those before it.
-void AppendLayer(Image layer, Image& layers);
+// An image of the traversal's light buffer as it stands at so many times, without pixels.
+Image DescribeLightImage(const Traversal& traversal, int layers);
 
 }  // namespace halflight
