@@ -30,6 +30,7 @@ struct Traversal {
   bool back_to_front = false;
   int slices = 1;
   bool interpolate = false;
+  bool in_tiles = false;  // composited in compute, not through the blend units
   SliceSpacing spacing = SliceSpacing::kEqualCount;
 
   int light_buffer_size = 0;          // texels along each side; 0: no light buffer

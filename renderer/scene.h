@@ -115,6 +115,12 @@ enum class ShadowTechniqueKind : uint8_t {
   kLightSweep,  // exact order along each light, fitted over footprints, on the CPU
 };
 enum class SliceSpacing : uint8_t { kEqualCount, kEqualOpticalDepth };
+// What half-angle slicing composites and deposits by.
+enum class SliceCompositor : uint8_t {
+  kAuto,    // what is faster on the device: see CompositorFor
+  kRaster,  // one quad a particle through the blend units, slice after slice
+  kTiles,   // tiles of the image and of the light buffer in compute
+};
 enum class BlurMode : uint8_t { kDistance, kTexelsPerSlice };
 
 struct ShadowSettings {
@@ -125,6 +131,7 @@ struct ShadowSettings {
   int light_buffer_size = 512;  // texels along each side
   BlurMode blur_mode = BlurMode::kDistance;
   float blur_texels = 0.0F;  // with kTexelsPerSlice
+  SliceCompositor compositor = SliceCompositor::kAuto;
   // With kLightSweep: of the polynomial in which a particle keeps the light over its footprint, at
   // most kMaxFitDegree.
   int fit_degree = 4;

@@ -32,6 +32,11 @@ ShadowTechniqueKind DefaultTechnique(const FrameRequest& request, bool software_
              : ShadowTechniqueKind::kHalfAngle;
 }
 
+SliceCompositor CompositorFor(SliceCompositor asked, bool software_renderer) {
+  if (asked != SliceCompositor::kAuto) return asked;
+  return software_renderer ? SliceCompositor::kRaster : SliceCompositor::kTiles;
+}
+
 LightReport ReportOf(const Projection& light) {
   LightReport report;
   report.casts_shadows = true;

@@ -156,15 +156,17 @@ void AddMaterialFlags(CLI::App& app, RenderOptions& options) {
 }
 
 void AddShadowFlags(CLI::App& app, RenderOptions& options) {
-  AddChoice<v1::ShadowTechnique>(app, "--technique", options.technique,
-                                 {{"half-angle", v1::SHADOW_TECHNIQUE_HALF_ANGLE},
-                                  {"light-sweep", v1::SHADOW_TECHNIQUE_LIGHT_SWEEP},
-                                  {"reference", v1::SHADOW_TECHNIQUE_REFERENCE}},
-                                 "How shadows are computed: by slices; along each light, on the "
-                                 "CPU; or exactly, in float64 on the CPU. Default: light-sweep on "
-                                 "servers without a GPU, unless something asks for slices "
-                                 "(--slices, --plain, --spacing, --blur, --scattering, layers); "
-                                 "otherwise half-angle");
+  AddChoice<v1::ShadowTechnique>(
+      app, "--technique", options.technique,
+      {{"half-angle", v1::SHADOW_TECHNIQUE_HALF_ANGLE},
+       {"light-sweep", v1::SHADOW_TECHNIQUE_LIGHT_SWEEP},
+       {"reference", v1::SHADOW_TECHNIQUE_REFERENCE}},
+      "How shadows are computed: by slices; along each light, on the "
+      "CPU; or exactly, in float64 on the CPU. Default: light-sweep on "
+      "servers without a GPU, unless something asks for slices "
+      "(--slices, --plain, --spacing, --compositor, --blur, --scattering, "
+      "layers); "
+      "otherwise half-angle");
   AddCount(app, "--fit-degree", options.fit_degree, 0, 6,
            "Degree in which light-sweep keeps the light over a particle; default: 4");
   AddCount(app, "--slices", options.slices, 1, INT32_MAX, "Slices of half-angle; default: 128");
@@ -173,6 +175,11 @@ void AddShadowFlags(CLI::App& app, RenderOptions& options) {
                               {{"count", v1::SLICE_SPACING_EQUAL_COUNT},
                                {"optical-depth", v1::SLICE_SPACING_EQUAL_OPTICAL_DEPTH}},
                               "What slices have in equal parts; default: count");
+  AddChoice<v1::SliceCompositor>(
+      app, "--compositor", options.compositor,
+      {{"raster", v1::SLICE_COMPOSITOR_RASTER}, {"tiles", v1::SLICE_COMPOSITOR_TILES}},
+      "What slices are drawn by: the blend units, or tiles in compute shaders; default: tiles on "
+      "GPUs, raster on CPUs");
   AddCount(app, "--light-buffer", options.light_buffer_size, 16, 65536,
            "Width and height of the light buffer in texels; default: 512");
   AddChoice<v1::BlurMode>(
@@ -207,8 +214,8 @@ void AddErrorFlags(CLI::App& app, RenderOptions& options) {
       AddNumber(app, "--max-time", options.max_time_ms, kPositive,
                 "Choose the settings: the most accurate that render in so many milliseconds")
           ->type_name("MS");
-  for (const char* settings : {"--technique", "--slices", "--plain", "--spacing", "--light-buffer",
-                               "--fit-degree", "--blur", "--blur-texels"}) {
+  for (const char* settings : {"--technique", "--slices", "--plain", "--spacing", "--compositor",
+                               "--light-buffer", "--fit-degree", "--blur", "--blur-texels"}) {
     max_error->excludes(app.get_option(settings));
     max_time->excludes(app.get_option(settings));
   }

@@ -183,6 +183,7 @@ ImageMetadata DescribeImage(const FrameJob& job, const MadeFrame& frame, const O
       {"halflight:slices", fmt::format("{}", shadow.slices())},
       {"halflight:interpolate", shadow.interpolate() ? "true" : "false"},
       {"halflight:spacing", v1::SliceSpacing_Name(shadow.spacing())},
+      {"halflight:compositor", v1::SliceCompositor_Name(shadow.compositor())},
       {"halflight:lightBufferSize", fmt::format("{}", shadow.light_buffer_size())},
       {"halflight:blurMode", v1::BlurMode_Name(shadow.blur_mode())},
       {"halflight:blurTexels", fmt::format("{}", shadow.blur_texels())},

@@ -38,6 +38,10 @@ inline constexpr std::array kSpacings = {
     EnumRow{v1::SLICE_SPACING_EQUAL_COUNT, SliceSpacing::kEqualCount},
     EnumRow{v1::SLICE_SPACING_EQUAL_OPTICAL_DEPTH, SliceSpacing::kEqualOpticalDepth},
 };
+inline constexpr std::array kCompositors = {
+    EnumRow{v1::SLICE_COMPOSITOR_RASTER, SliceCompositor::kRaster},
+    EnumRow{v1::SLICE_COMPOSITOR_TILES, SliceCompositor::kTiles},
+};
 inline constexpr std::array kBlurModes = {
     EnumRow{v1::BLUR_MODE_DISTANCE, BlurMode::kDistance},
     EnumRow{v1::BLUR_MODE_TEXELS_PER_SLICE, BlurMode::kTexelsPerSlice},

@@ -38,10 +38,22 @@ Contestant Classic(Role role, int slices, bool interpolate) {
   shadow.technique = ShadowTechniqueKind::kHalfAngle;
   shadow.slices = slices;
   shadow.interpolate = interpolate;
+  shadow.compositor = SliceCompositor::kRaster;
   shadow.light_buffer_size = kLightBuffer;
   return {absl::StrCat("classic, ", slices, " slices", interpolate ? " interpolated" : ""), role,
           shadow};
 }
+
+namespace {
+
+// The same slices by tiles in compute.
+Contestant SlicesInTiles(int slices) {
+  ShadowSettings shadow = Classic(Role::kOurs, slices, true).shadow;
+  shadow.compositor = SliceCompositor::kTiles;
+  return {absl::StrCat("slices in tiles, ", slices, " interpolated"), Role::kOurs, shadow};
+}
+
+}  // namespace
 
 Contestant DefaultPath() {
   ShadowSettings shadow;
@@ -55,6 +67,7 @@ std::vector<Contestant> ListContestants(bool short_form, bool software) {
   std::vector<Contestant> all = {
       Classic(Role::kBaseline, 64, false),
       Classic(Role::kBaseline, 64, true),
+      SlicesInTiles(64),
   };
   if (!short_form) {
     all.push_back(Classic(Role::kClassic, 128, false));

@@ -136,6 +136,11 @@ v1::RenderFrameRequest RequestWithoutParticles(const Scene& scene) {
   shadow.set_spacing(scene.shadow.spacing == SliceSpacing::kEqualCount
                          ? v1::SLICE_SPACING_EQUAL_COUNT
                          : v1::SLICE_SPACING_EQUAL_OPTICAL_DEPTH);
+  if (scene.shadow.compositor != SliceCompositor::kAuto) {
+    shadow.set_compositor(scene.shadow.compositor == SliceCompositor::kRaster
+                              ? v1::SLICE_COMPOSITOR_RASTER
+                              : v1::SLICE_COMPOSITOR_TILES);
+  }
   shadow.set_light_buffer_size(scene.shadow.light_buffer_size);
   if (scene.shadow.blur_mode == BlurMode::kTexelsPerSlice) {
     shadow.set_blur_mode(v1::BLUR_MODE_TEXELS_PER_SLICE);

@@ -10,6 +10,7 @@
 #include <glm/vec4.hpp>
 
 #include "server/convert/convert_frame.h"
+#include "server/convert/convert_scene.h"
 #include "server/convert/describe.h"
 #include "server/convert/geometry.h"
 #include "tests/server/fake_engine.h"
@@ -208,6 +209,25 @@ TEST(ConvertTechnique, IsTheSweepOnACpuWhereTheRequestLeavesItOpen) {
   EXPECT_EQ(TechniqueOf(request, true), ShadowTechniqueKind::kHalfAngle);
 }
 
+TEST(ConvertCompositor, IsByTheDeviceWhereTheRequestLeavesItOpen) {
+  v1::RenderFrameRequest request = MakeRequest();
+  const auto compositor_of = [&](bool software) {
+    ParticleStore store(1 << 20);
+    const auto job = ConvertRequest(
+        request, store, {}, {.gl_renderer = "fake", .gl_version = {}, .software = software});
+    EXPECT_TRUE(job.ok()) << job.status();
+    return job.ok() ? DescribeShadow(job->request.scene.shadow).compositor()
+                    : v1::SLICE_COMPOSITOR_UNSPECIFIED;
+  };
+  EXPECT_EQ(compositor_of(true), v1::SLICE_COMPOSITOR_RASTER);
+  EXPECT_EQ(compositor_of(false), v1::SLICE_COMPOSITOR_TILES);
+  for (const auto asked : {v1::SLICE_COMPOSITOR_RASTER, v1::SLICE_COMPOSITOR_TILES}) {
+    request.mutable_scene()->mutable_shadow()->set_compositor(asked);
+    EXPECT_EQ(compositor_of(true), asked);
+    EXPECT_EQ(compositor_of(false), asked);
+  }
+}
+
 // Whatever only slices have, or the sweep refuses, asks for slices.
 TEST(ConvertTechnique, IsSlicesWhereTheRequestNeedsThem) {
   using Change = void (*)(v1::RenderFrameRequest&);
@@ -216,6 +236,9 @@ TEST(ConvertTechnique, IsSlicesWhereTheRequestNeedsThem) {
       [](v1::RenderFrameRequest& r) { r.mutable_scene()->mutable_shadow()->set_interpolate(true); },
       [](v1::RenderFrameRequest& r) {
         r.mutable_scene()->mutable_shadow()->set_spacing(v1::SLICE_SPACING_EQUAL_COUNT);
+      },
+      [](v1::RenderFrameRequest& r) {
+        r.mutable_scene()->mutable_shadow()->set_compositor(v1::SLICE_COMPOSITOR_RASTER);
       },
       [](v1::RenderFrameRequest& r) {
         r.mutable_scene()->mutable_shadow()->set_blur_mode(v1::BLUR_MODE_DISTANCE);

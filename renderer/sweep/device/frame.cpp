@@ -141,7 +141,7 @@ absl::StatusOr<std::shared_ptr<const EyeRuns>> RunsOf(const DrawContext& context
         if (!runs.ok()) return runs.status();
         made.runs = *std::move(runs);
         if (made.runs.size() == 1) {
-          auto tiles = ListDeviceTiles(context.gpu, sprites, made.runs[0].places,
+          auto tiles = ListDeviceTiles(context.gpu, sprites.rects, made.runs[0].places,
                                        key.sprites.eye.size, key.tile_size, made.runs[0].entries);
           if (!tiles.ok()) return tiles.status();
           made.tiles = *std::move(tiles);
@@ -201,7 +201,7 @@ absl::Status CompositeRuns(const DrawContext& context, const SeenScene& seen, co
     if (eye.runs.size() > 1) {
       context.clock.BeginGpu("project");
       absl::StatusOr<DeviceTiles> tiles =
-          ListDeviceTiles(context.gpu, seen.sprites, run.places, seen.eye.projection.size,
+          ListDeviceTiles(context.gpu, seen.sprites.rects, run.places, seen.eye.projection.size,
                           walk.tile_size, run.entries);
       if (!tiles.ok()) return tiles.status();
       listed = *std::move(tiles);
