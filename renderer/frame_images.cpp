@@ -48,6 +48,15 @@ Image ReadTexture(const gl::Texture& texture) {
   return image;
 }
 
+void AppendLayer(Image layer, Image& layers) {
+  if (layers.pixels.empty()) {
+    layers = std::move(layer);
+    return;
+  }
+  layers.pixels.insert(layers.pixels.end(), layer.pixels.begin(), layer.pixels.end());
+  ++layers.layers;
+}
+
 void AddColors(const Image& other, Image& image) {
   for (size_t i = 0; i < image.pixels.size(); ++i) {
     if (i % 4 != 3) image.pixels[i] += other.pixels[i];

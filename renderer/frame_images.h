@@ -32,6 +32,9 @@ std::vector<Image> SelectImages(const FrameRequest& request, DrawnImages&& drawn
 // All four channels of a texture. Waits for the device.
 Image ReadTexture(const gl::Texture& texture);
 
+// Puts a layer of the same size behind those that are there, or begins them.
+void AppendLayer(Image layer, Image& layers);
+
 // R G B A += other, of the same size.
 void AddColors(const Image& other, Image& image);
 
