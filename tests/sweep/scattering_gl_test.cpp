@@ -1,20 +1,16 @@
 // Light that scatters between the slabs of the light sweep and of the particle shadow map: what it
 // does not depend on, and half-angle slicing where both see the same.
-#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <iostream>
 #include <string>
 
-#include "renderer/scattering.h"
 #include "tests/oracle/plume.h"
 #include "tests/renderer/gl_fixture.h"
 
 namespace halflight {
 namespace {
-
-using ::testing::HasSubstr;
 
 constexpr auto kSweep = ShadowTechniqueKind::kLightSweep;
 constexpr auto kLayered = ShadowTechniqueKind::kParticleShadowMap;
@@ -26,12 +22,6 @@ double RootMeanSquare(const Image& a, const Image& b) {
     squares += std::pow(static_cast<double>(a.pixels[i]) - b.pixels[i], 2);
   }
   return std::sqrt(squares / static_cast<double>(a.pixels.size()));
-}
-
-double Mean(const Image& image) {
-  double sum = 0.0;
-  for (const float value : image.pixels) sum += value;
-  return sum / static_cast<double>(image.pixels.size());
 }
 
 // A faint occluder at the top of a column, 2 units long, of particles too faint to shadow, wide
