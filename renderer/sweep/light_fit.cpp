@@ -8,7 +8,6 @@
 #include <span>
 #include <utility>
 
-#include "renderer/frame_images.h"
 #include "renderer/light_spread.h"
 #include "renderer/parallel.h"
 #include "renderer/particle_order.h"
@@ -221,6 +220,16 @@ class Sweep {
   LightPlanes& planes_;
   LightFit& fit_;
 };
+
+// Puts a layer of the same size behind those that are there, or begins them.
+void AppendLayer(Image layer, Image& layers) {
+  if (layers.pixels.empty()) {
+    layers = std::move(layer);
+    return;
+  }
+  layers.pixels.insert(layers.pixels.end(), layer.pixels.begin(), layer.pixels.end());
+  ++layers.layers;
+}
 
 // Runs of one slab; all of it, where a particle sees the layer behind it.
 std::vector<TileRun> RunsOf(const SpriteList& list, const TileRun& slab, bool layered,

@@ -43,13 +43,19 @@ absl::Status LightSweep::Plan(const FrameRequest& request, const ParticleView& p
   return sweep::PlanFrame(request, particles, kName, plan);
 }
 
+bool LightSweep::DrawsOnDevice(const FrameRequest& request, const DeviceInfo& device) const {
+  const SweepOn where = request.sweep_on;
+  return where == SweepOn::kDevice ||
+         (where == SweepOn::kAuto && !device.software && !IsCutIntoSlabs(request));
+}
+
 absl::StatusOr<DrawnFrame> LightSweep::Draw(const DrawContext& context) const {
-  if (!DrawsOnDevice(context)) return sweep::DrawOnCpu(context);
+  if (!DrawsOnDevice(context.request, context.device)) return sweep::DrawOnCpu(context);
   absl::StatusOr<DrawnFrame> frame = sweep::DrawOnDevice(context);
   // What the device cannot hold the CPU can, unless the device was asked for.
   const bool too_large = absl::IsResourceExhausted(frame.status());
-  return too_large && context.request.sweep_on == SweepOn::kAuto ? sweep::DrawOnCpu(context)
-                                                                 : frame;
+  if (too_large && context.request.sweep_on == SweepOn::kAuto) return sweep::DrawOnCpu(context);
+  return frame;
 }
 
 }  // namespace halflight
