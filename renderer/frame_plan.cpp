@@ -1,5 +1,7 @@
 #include "renderer/frame_plan.h"
 
+#include <algorithm>
+
 #include "renderer/frame.h"
 #include "renderer/shadow_technique.h"
 
@@ -21,6 +23,20 @@ void DescribeSampling(const Sampling& sampling, FramePlan& plan) {
 glm::ivec2 CompositeSize(const PixelRect& window, const Sampling& sampling) {
   const glm::ivec2 pixels(window.width, window.height);
   return (pixels * sampling.supersample + (sampling.downsample - 1)) / sampling.downsample;
+}
+
+Traversal PlanLightBuffer(const Scene& scene, const ParticleView& particles, int light) {
+  Traversal traversal;
+  traversal.shadow_light = light;
+  traversal.slices = static_cast<int>(
+      std::clamp<size_t>(particles.size(), 1, static_cast<size_t>(scene.shadow.slices)));
+  traversal.spacing = scene.shadow.spacing;
+  traversal.light_buffer_size = scene.shadow.light_buffer_size;
+  traversal.blur = scene.scatters();
+  traversal.keep_unscattered = traversal.blur && scene.material.physical_scattering;
+  traversal.colored_light_buffer =
+      traversal.blur && scene.lights[static_cast<size_t>(light)].colored_density();
+  return traversal;
 }
 
 absl::StatusOr<FramePlan> PlanFrame(const FrameRequest& request, const ParticleView& particles) {

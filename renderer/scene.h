@@ -90,6 +90,8 @@ enum class Profile : uint8_t { kSoft, kBall };
 struct PhysicalScattering {
   float mean_cosine = 0.0F;  // [0, 1)
   float albedo = 1.0F;       // share of the light met that is scattered, not absorbed: [0, 1]
+
+  bool operator==(const PhysicalScattering&) const = default;
 };
 
 struct Material {
@@ -112,7 +114,9 @@ struct Material {
 enum class ShadowTechniqueKind : uint8_t {
   kHalfAngle,
   kReference,   // the image model itself, on the CPU
-  kLightSweep,  // exact order along each light, fitted over footprints, on the CPU
+  kLightSweep,  // exact order along each light, fitted over footprints
+  // Uniform depth bins along each light, interpolated, fitted over footprints, on the CPU.
+  kParticleShadowMap,
 };
 enum class SliceSpacing : uint8_t { kEqualCount, kEqualOpticalDepth };
 // What half-angle slicing composites and deposits by.
@@ -132,8 +136,8 @@ struct ShadowSettings {
   BlurMode blur_mode = BlurMode::kDistance;
   float blur_texels = 0.0F;  // with kTexelsPerSlice
   SliceCompositor compositor = SliceCompositor::kAuto;
-  // With kLightSweep: of the polynomial in which a particle keeps the light over its footprint, at
-  // most kMaxFitDegree.
+  // With kLightSweep and kParticleShadowMap: of the polynomial in which a particle keeps the light
+  // over its footprint, at most kMaxFitDegree.
   int fit_degree = 4;
 
   bool operator==(const ShadowSettings&) const = default;

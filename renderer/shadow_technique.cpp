@@ -6,6 +6,7 @@
 #include "renderer/projection.h"
 #include "renderer/techniques/half_angle.h"
 #include "renderer/techniques/light_sweep.h"
+#include "renderer/techniques/particle_shadow_map.h"
 #include "renderer/techniques/reference.h"
 
 namespace halflight {
@@ -13,10 +14,13 @@ namespace halflight {
 const ShadowTechnique& TechniqueFor(ShadowTechniqueKind kind) {
   static const HalfAngle half_angle;
   static const LightSweep light_sweep;
+  static const ParticleShadowMap particle_shadow_map;
   static const Reference reference;
   switch (kind) {
     case ShadowTechniqueKind::kLightSweep:
       return light_sweep;
+    case ShadowTechniqueKind::kParticleShadowMap:
+      return particle_shadow_map;
     case ShadowTechniqueKind::kReference:
       return reference;
     case ShadowTechniqueKind::kHalfAngle:

@@ -160,17 +160,21 @@ void AddShadowFlags(CLI::App& app, RenderOptions& options) {
       app, "--technique", options.technique,
       {{"half-angle", v1::SHADOW_TECHNIQUE_HALF_ANGLE},
        {"light-sweep", v1::SHADOW_TECHNIQUE_LIGHT_SWEEP},
+       {"particle-shadow-map", v1::SHADOW_TECHNIQUE_PARTICLE_SHADOW_MAP},
        {"reference", v1::SHADOW_TECHNIQUE_REFERENCE}},
-      "How shadows are computed: by slices; along each light, on the "
-      "CPU; or exactly, in float64 on the CPU. Default: light-sweep on "
-      "servers without a GPU, unless something asks for slices "
-      "(--slices, --plain, --spacing, --compositor, --blur, --scattering, "
-      "layers); "
-      "otherwise half-angle");
+      "How shadows are computed: by slices; along each light; from "
+      "slices along each light, for comparison; or exactly, in float64 "
+      "on the CPU. Default: light-sweep on servers without a GPU, unless "
+      "something asks for slices (--slices, --plain, --spacing, "
+      "--compositor, --blur, --blur-texels); otherwise half-angle");
   AddCount(app, "--fit-degree", options.fit_degree, 0, 6,
-           "Degree in which light-sweep keeps the light over a particle; default: 4");
-  AddCount(app, "--slices", options.slices, 1, INT32_MAX, "Slices of half-angle; default: 128");
-  app.add_flag("--plain", options.plain, "Do not interpolate the light within a slice");
+           "Degree in which light-sweep and particle-shadow-map keep the light over a particle; "
+           "default: 4");
+  AddCount(
+      app, "--slices", options.slices, 1, INT32_MAX,
+      "Slices of half-angle and particle-shadow-map, and of light-sweep where light scatters or "
+      "layers are shown; default: 128");
+  app.add_flag("--plain", options.plain, "Do not interpolate the light within half-angle's slices");
   AddChoice<v1::SliceSpacing>(app, "--spacing", options.spacing,
                               {{"count", v1::SLICE_SPACING_EQUAL_COUNT},
                                {"optical-depth", v1::SLICE_SPACING_EQUAL_OPTICAL_DEPTH}},

@@ -6,6 +6,7 @@
 #include "renderer/sweep/simd.h"
 
 #define HALFLIGHT_KERNEL_SET baseline
+#include "renderer/sweep/blur_kernel.inc"
 #include "renderer/sweep/kernels.inc"
 
 #if defined(__x86_64__)

@@ -145,7 +145,6 @@ absl::Status HalfAngle::Plan(const FrameRequest& request, const ParticleView& pa
       continue;
     }
     Traversal traversal = PlanHalfAngleLight(scene, particles, light);
-    traversal.shadow_light = light;
     KeepWhatOutputsShow(request.images, traversal);
     plan.traversals.push_back(std::move(traversal));
   }

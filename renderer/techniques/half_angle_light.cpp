@@ -1,80 +1,16 @@
 #include "renderer/techniques/half_angle_light.h"
 
-#include <algorithm>
-#include <cmath>
-#include <limits>
-
 #include <glm/geometric.hpp>
 
 #include "absl/strings/str_cat.h"
 #include "renderer/frame.h"
-#include "renderer/scattering.h"
+#include "renderer/light_spread.h"
 #include "renderer/shadow_technique.h"
 #include "renderer/techniques/half_angle_tiles.h"
 
 namespace halflight {
 
 namespace {
-
-// How light spreads along one light's traversal.
-class Spread {
- public:
-  // Of a scene that scatters. `light_along_axis`: distance along the axis for one along the light.
-  Spread(const TraversalContext& context, const Light& light, double light_along_axis)
-      : shadow_(context.scene.shadow),
-        spread_(context.scene.material.scattering_spread),
-        light_along_axis_(light_along_axis) {
-    if (context.scene.material.physical_scattering) {
-      physical_.emplace(context.particles, light, *context.traversal.axis,
-                        *context.scene.material.physical_scattering,
-                        context.scene.material.profile);
-    }
-  }
-
-  // Squared world units by which light spreads between two positions along the axis.
-  [[nodiscard]] glm::dvec3 Variance(double from, double to) const {
-    if (physical_) return physical_->VarianceAt(to) - physical_->VarianceAt(from);
-    return glm::dvec3(spread_ * spread_ * (to - from) / light_along_axis_);
-  }
-
-  // The same in texels of the light buffer, between two slices that lie there.
-  [[nodiscard]] BlurVariance InTexels(double from, double to,
-                                      const glm::dvec2& texels_per_unit) const {
-    if (shadow_.blur_mode == BlurMode::kTexelsPerSlice) {
-      const double texels = shadow_.blur_texels;
-      return {glm::dvec3(texels * texels), glm::dvec3(texels * texels)};
-    }
-    const glm::dvec3 variance = Variance(from, to);
-    return {variance * texels_per_unit.x * texels_per_unit.x,
-            variance * texels_per_unit.y * texels_per_unit.y};
-  }
-
-  // World units by which light that crosses the whole cloud has spread sideways, thrice the
-  // standard deviation; never so much that the cloud itself shrinks to nothing in the light buffer.
-  [[nodiscard]] double Border(const OffsetBounds& bounds) const {
-    if (shadow_.blur_mode == BlurMode::kTexelsPerSlice) return 0.0;
-    const double diameter = glm::distance(bounds.low, bounds.high);
-    const glm::dvec3 variance = physical_
-                                    ? physical_->VarianceAt(std::numeric_limits<double>::infinity())
-                                    : glm::dvec3(spread_ * spread_ * diameter);
-    return std::min(3.0 * std::sqrt(std::max({variance.r, variance.g, variance.b})),
-                    0.25 * diameter);
-  }
-
- private:
-  const ShadowSettings& shadow_;
-  double spread_;
-  double light_along_axis_;
-  std::optional<PhysicalSpread> physical_;
-};
-
-// Texels of the light buffer for one world unit at the middle of the particles.
-glm::dvec2 TexelsPerUnit(const Projection& light, const ParticleView& particles) {
-  const glm::dvec2 texels_per_unit = glm::abs(light.pixel_from_plane);
-  if (light.orthographic) return texels_per_unit;
-  return texels_per_unit /
-         glm::distance(particles.set().origin + particles.bounds().center(), light.eye());
-}
 
 LightChannels ChannelsOf(const Traversal& traversal) {
   return {.colored = traversal.colored_light_buffer, .unscattered = traversal.keep_unscattered};
@@ -170,18 +106,11 @@ Traversal PlanHalfAngleLight(const Scene& scene, const ParticleView& particles, 
   const Light& source = scene.lights[static_cast<size_t>(light)];
   const HalfAngleAxis half_angle =
       ComputeHalfAngleAxis(ViewDirection(scene.camera), TravelDirection(source, particles));
-  Traversal traversal;
+  Traversal traversal = PlanLightBuffer(scene, particles, light);
   traversal.axis = half_angle.axis;
   traversal.back_to_front = half_angle.back_to_front;
-  traversal.slices = static_cast<int>(
-      std::clamp<size_t>(particles.size(), 1, static_cast<size_t>(scene.shadow.slices)));
   traversal.in_tiles = scene.shadow.compositor == SliceCompositor::kTiles;
   traversal.interpolate = scene.shadow.interpolate;
-  traversal.spacing = scene.shadow.spacing;
-  traversal.light_buffer_size = scene.shadow.light_buffer_size;
-  traversal.blur = scene.scatters();
-  traversal.keep_unscattered = traversal.blur && scene.material.physical_scattering;
-  traversal.colored_light_buffer = traversal.blur && source.colored_density();
   return traversal;
 }
 
@@ -236,17 +165,11 @@ absl::Status DrawHalfAngleLight(const TraversalContext& context, LightReport& re
   if (!sorted.ok()) return sorted.status();
   const DeviceOrder& order = **sorted;
   context.clock.BeginCpu("light camera");
-  std::optional<Spread> spread;
-  if (traversal.blur) {
-    spread.emplace(context, source,
-                   glm::dot(TravelDirection(source, context.particles), *traversal.axis));
-  }
-  Projection light_projection =
-      LightProjection(source, context.particles, traversal.light_buffer_size,
-                      spread ? spread->Border(context.particles.bounds()) : 0.0);
-  if (const auto& physical = context.scene.material.physical_scattering) {
-    light_projection.optical_depth_scale = ForwardExtinction(*physical);
-  }
+  std::optional<LightSpread> spread;
+  if (traversal.blur) spread.emplace(context.scene, source, context.particles, *traversal.axis);
+  Projection light_projection = LightProjection(
+      source, context.particles, traversal.light_buffer_size, spread ? spread->Border() : 0.0);
+  light_projection.optical_depth_scale = ForwardExtinction(context.scene.material);
   report = ReportOf(light_projection);
   report.slice_axis = *traversal.axis;
   report.slices = traversal.slices;

@@ -33,6 +33,7 @@ inline constexpr std::array kTechniques = {
     EnumRow{v1::SHADOW_TECHNIQUE_HALF_ANGLE, ShadowTechniqueKind::kHalfAngle},
     EnumRow{v1::SHADOW_TECHNIQUE_REFERENCE, ShadowTechniqueKind::kReference},
     EnumRow{v1::SHADOW_TECHNIQUE_LIGHT_SWEEP, ShadowTechniqueKind::kLightSweep},
+    EnumRow{v1::SHADOW_TECHNIQUE_PARTICLE_SHADOW_MAP, ShadowTechniqueKind::kParticleShadowMap},
 };
 inline constexpr std::array kSpacings = {
     EnumRow{v1::SLICE_SPACING_EQUAL_COUNT, SliceSpacing::kEqualCount},

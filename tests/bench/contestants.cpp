@@ -19,6 +19,16 @@ Contestant LightSweep(int degree, int light_buffer_size) {
           shadow};
 }
 
+// Layers along the light in place of its exact order, fitted as the sweep is.
+Contestant Layered(int bins) {
+  ShadowSettings shadow;
+  shadow.technique = ShadowTechniqueKind::kParticleShadowMap;
+  shadow.slices = bins;
+  shadow.fit_degree = 3;
+  shadow.light_buffer_size = kLightBuffer;
+  return {absl::StrCat("layered, ", bins, " bins, degree 3"), Role::kOurs, shadow};
+}
+
 Contestant OnCpu(Contestant contestant) {
   contestant.name += ", on the CPU";
   contestant.sweep_on = SweepOn::kCpu;
@@ -72,6 +82,8 @@ std::vector<Contestant> ListContestants(bool short_form, bool software) {
   if (!short_form) {
     all.push_back(Classic(Role::kClassic, 128, false));
     all.push_back(Classic(Role::kClassic, 128, true));
+    all.push_back(Layered(64));
+    all.push_back(Layered(128));
   }
   for (const int light_buffer_size : {kLightBuffer, 512}) {
     for (int degree = 0; degree <= kMaxFitDegree; ++degree) {

@@ -228,7 +228,29 @@ TEST(ConvertCompositor, IsByTheDeviceWhereTheRequestLeavesItOpen) {
   }
 }
 
-// Whatever only slices have, or the sweep refuses, asks for slices.
+// Scattering and layers the sweep has itself.
+TEST(ConvertTechnique, IsTheSweepOnACpuWhereLightScattersOrShowsItsLayers) {
+  using Change = void (*)(v1::RenderFrameRequest&);
+  const Change changes[] = {
+      [](v1::RenderFrameRequest& r) {
+        r.mutable_scene()->mutable_material()->set_scattering_spread(0.1F);
+      },
+      [](v1::RenderFrameRequest& r) {
+        r.mutable_scene()->mutable_material()->mutable_physical_scattering();
+      },
+      [](v1::RenderFrameRequest& r) { r.add_outputs()->set_kind(v1::OUTPUT_KIND_LIGHT_LAYERS); },
+  };
+  for (const Change& change : changes) {
+    v1::RenderFrameRequest request = MakeRequest();
+    change(request);
+    EXPECT_EQ(TechniqueOf(request, true), ShadowTechniqueKind::kLightSweep)
+        << request.ShortDebugString();
+    EXPECT_EQ(TechniqueOf(request, false), ShadowTechniqueKind::kHalfAngle)
+        << request.ShortDebugString();
+  }
+}
+
+// Whatever is set of slices asks for them.
 TEST(ConvertTechnique, IsSlicesWhereTheRequestNeedsThem) {
   using Change = void (*)(v1::RenderFrameRequest&);
   const Change changes[] = {
@@ -243,13 +265,6 @@ TEST(ConvertTechnique, IsSlicesWhereTheRequestNeedsThem) {
       [](v1::RenderFrameRequest& r) {
         r.mutable_scene()->mutable_shadow()->set_blur_mode(v1::BLUR_MODE_DISTANCE);
       },
-      [](v1::RenderFrameRequest& r) {
-        r.mutable_scene()->mutable_material()->set_scattering_spread(0.1F);
-      },
-      [](v1::RenderFrameRequest& r) {
-        r.mutable_scene()->mutable_material()->mutable_physical_scattering();
-      },
-      [](v1::RenderFrameRequest& r) { r.add_outputs()->set_kind(v1::OUTPUT_KIND_LIGHT_LAYERS); },
   };
   for (const Change& change : changes) {
     v1::RenderFrameRequest request = MakeRequest();
