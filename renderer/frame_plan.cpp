@@ -1,6 +1,7 @@
 #include "renderer/frame_plan.h"
 
 #include "renderer/frame.h"
+#include "renderer/light_buffer_size.h"
 #include "renderer/shadow_technique.h"
 
 namespace halflight {
@@ -37,6 +38,7 @@ absl::StatusOr<FramePlan> PlanFrame(const FrameRequest& request, const ParticleV
   plan.keep_depth = Shows(request, ImageKind::kDepth);
   const ShadowTechnique& technique = TechniqueFor(scene.shadow.technique);
   if (absl::Status status = technique.Check(request); !status.ok()) return status;
+  plan.light_buffer_size = LightBufferSizeFor(scene, particles);
   if (absl::Status status = technique.Plan(request, particles, plan); !status.ok()) return status;
   DescribeSampling(scene.sampling, plan);
   return plan;

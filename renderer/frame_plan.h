@@ -54,6 +54,7 @@ struct PlannedPass {
 struct FramePlan {
   glm::ivec2 window_size{0};          // pixels of the image
   glm::ivec2 composite_size{0};       // pixels composited, after super- or downsampling
+  int light_buffer_size = 0;          // texels along each side of all light buffers, if any
   bool keep_depth = false;            // an output shows it; drawn by the first traversal
   std::vector<Traversal> traversals;  // at least one, but for the reference: none
   std::vector<PlannedPass> passes;    // what the above comes to, for people

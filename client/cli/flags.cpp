@@ -173,8 +173,10 @@ void AddShadowFlags(CLI::App& app, RenderOptions& options) {
                               {{"count", v1::SLICE_SPACING_EQUAL_COUNT},
                                {"optical-depth", v1::SLICE_SPACING_EQUAL_OPTICAL_DEPTH}},
                               "What slices have in equal parts; default: count");
-  AddCount(app, "--light-buffer", options.light_buffer_size, 16, 65536,
-           "Width and height of the light buffer in texels; default: 512");
+  AddCount(
+      app, "--light-buffer", options.light_buffer_size, 16, 65536,
+      "Width and height of the light buffer in texels; default: half-angle 512, light-sweep by "
+      "the particles' radii, 64 to 1024");
   AddChoice<v1::BlurMode>(
       app, "--blur", options.blur_mode,
       {{"distance", v1::BLUR_MODE_DISTANCE}, {"texels", v1::BLUR_MODE_TEXELS_PER_SLICE}},

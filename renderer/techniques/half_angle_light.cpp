@@ -8,6 +8,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "renderer/frame.h"
+#include "renderer/light_buffer_size.h"
 #include "renderer/scattering.h"
 #include "renderer/shadow_technique.h"
 
@@ -122,7 +123,8 @@ Traversal PlanHalfAngleLight(const Scene& scene, const ParticleView& particles, 
       std::clamp<size_t>(particles.size(), 1, static_cast<size_t>(scene.shadow.slices)));
   traversal.interpolate = scene.shadow.interpolate;
   traversal.spacing = scene.shadow.spacing;
-  traversal.light_buffer_size = scene.shadow.light_buffer_size;
+  traversal.light_buffer_size =
+      LargestLightBufferSize(scene.shadow, ShadowTechniqueKind::kHalfAngle);
   traversal.blur = scene.scatters();
   traversal.keep_unscattered = traversal.blur && scene.material.physical_scattering;
   traversal.colored_light_buffer = traversal.blur && source.colored_density();

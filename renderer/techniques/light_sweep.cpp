@@ -29,10 +29,12 @@ bool DrawsOnDevice(const DrawContext& context) {
   return where == SweepOn::kDevice || (where == SweepOn::kAuto && !context.device.software);
 }
 
-std::vector<PlannedPass> LightPasses(size_t light) {
+std::vector<PlannedPass> LightPasses(size_t light, const FramePlan& plan) {
   const std::string reason = absl::StrCat("light ", light, " casts shadows");
+  const std::string texels =
+      absl::StrCat(", on ", plan.light_buffer_size, " x ", plan.light_buffer_size, " texels");
   return {{"sort along the light", reason, 1},
-          {"sweep the light buffer through the particles", reason, 1},
+          {"sweep the light buffer through the particles", reason + texels, 1},
           {"fit the light over every footprint", reason, 1}};
 }
 
@@ -54,10 +56,10 @@ struct LightFitKey {
   bool operator==(const LightFitKey&) const = default;
 };
 
-LightFitKey LightFitKeyOf(const Scene& scene, const Light& light) {
+LightFitKey LightFitKeyOf(const Scene& scene, const Light& light, const FramePlan& plan) {
   LightFitKey key{.particles = ParticleViewKeyOf(scene),
                   .profile = scene.material.profile,
-                  .light_buffer_size = scene.shadow.light_buffer_size,
+                  .light_buffer_size = plan.light_buffer_size,
                   .degree = scene.shadow.fit_degree};
   if (const auto* const point = std::get_if<PointLight>(&light.kind)) {
     key.point = true;
@@ -91,15 +93,16 @@ absl::StatusOr<std::shared_ptr<const sweep::LightFit>> FitOf(const DrawContext& 
                                                              size_t light, DrawnFrame& frame) {
   const Scene& scene = context.request.scene;
   bool made = false;
-  auto fit =
-      context.cache.FindOrMake(scene.particles, LightFitKeyOf(scene, scene.lights[light]), [&] {
+  auto fit = context.cache.FindOrMake(
+      scene.particles, LightFitKeyOf(scene, scene.lights[light], context.plan), [&] {
         made = true;
         return sweep::FitLight(scene.lights[light], context.particles, scene.material.profile,
-                               scene.shadow.light_buffer_size, scene.shadow.fit_degree,
+                               context.plan.light_buffer_size, scene.shadow.fit_degree,
                                context.stop);
       });
   if (!made) {
-    for (PlannedPass& pass : LightPasses(light)) frame.reused.push_back(std::move(pass));
+    for (PlannedPass& pass : LightPasses(light, context.plan))
+      frame.reused.push_back(std::move(pass));
   }
   return fit;
 }
@@ -158,7 +161,7 @@ absl::Status LightSweep::Plan(const FrameRequest& request, const ParticleView& p
   }
   for (size_t l = 0; l < scene.lights.size(); ++l) {
     if (!scene.lights[l].casts_shadows()) continue;
-    for (PlannedPass& pass : LightPasses(l)) plan.passes.push_back(std::move(pass));
+    for (PlannedPass& pass : LightPasses(l, plan)) plan.passes.push_back(std::move(pass));
   }
   plan.passes.push_back(EyeSort());
   plan.passes.push_back({"composite tiles", "the image", 1});

@@ -139,7 +139,7 @@ absl::StatusOr<DrawnFrame> DrawOnDevice(const DrawContext& context,
     if (!scene.lights[l].casts_shadows()) continue;
     absl::StatusOr<DeviceLightFit> fit = FitLightOnDevice(
         context.gpu, scene.lights[l], context.particles, **buffers, scene.material.profile,
-        scene.shadow.light_buffer_size, scene.shadow.fit_degree, context.stop,
+        context.plan.light_buffer_size, scene.shadow.fit_degree, context.stop,
         LightSweepSettingsFor(context.device));
     if (!fit.ok()) return fit.status();
     frame.reports[l] = ReportOf(fit->projection);
