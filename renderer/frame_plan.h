@@ -55,6 +55,7 @@ struct PlannedPass {
 struct FramePlan {
   glm::ivec2 window_size{0};     // pixels of the image
   glm::ivec2 composite_size{0};  // pixels composited, after super- or downsampling
+  int light_buffer_size = 0;     // texels along each side of all light buffers, if any
   bool keep_depth = false;       // an output shows it; drawn by the first traversal
   // Of slicing at least one; of the light sweep and the particle shadow map one for each light that
   // casts shadows; of the reference none.

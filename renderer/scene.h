@@ -132,7 +132,10 @@ struct ShadowSettings {
   int slices = 128;
   bool interpolate = true;
   SliceSpacing spacing = SliceSpacing::kEqualCount;
-  int light_buffer_size = 512;  // texels along each side
+  // Texels along each side of every light buffer; 0: as many as the frame needs, see
+  // light_buffer_size.h, and at most max_light_buffer_size.
+  int light_buffer_size = 0;
+  int max_light_buffer_size = 4096;
   BlurMode blur_mode = BlurMode::kDistance;
   float blur_texels = 0.0F;  // with kTexelsPerSlice
   SliceCompositor compositor = SliceCompositor::kAuto;

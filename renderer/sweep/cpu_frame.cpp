@@ -22,11 +22,13 @@ namespace {
 std::vector<PlannedPass> LightPasses(const Traversal& traversal, bool layered) {
   const std::string reason = absl::StrCat("light ", *traversal.shadow_light, " casts shadows");
   const int slabs = traversal.slices;
+  const int size = traversal.light_buffer_size;
+  const std::string texels = absl::StrCat(", on ", size, " x ", size, " texels");
   std::vector<PlannedPass> passes = {{"sort along the light", reason, 1}};
   if (traversal.blur) passes.push_back({"blur light buffer", "the light scatters", slabs - 1});
   passes.push_back(
       {layered ? "deposit slice into light buffer" : "sweep the light buffer through the particles",
-       reason, slabs});
+       reason + texels, slabs});
   if (traversal.keep_layers) passes.push_back({"keep layer", "light layers wanted", slabs});
   passes.push_back({"fit the light over every footprint", reason, 1});
   return passes;

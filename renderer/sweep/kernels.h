@@ -159,8 +159,7 @@ struct Kernels {
   void (*composite_image_tile)(const ImageTileJob& job);
 };
 
-// For the CPU this runs on, and for any.
+// For the CPU this runs on; see ListKernels in kernel_sets.h.
 const Kernels& BestKernels();
-const Kernels& BaselineKernels();
 
 }  // namespace halflight::sweep

@@ -136,10 +136,9 @@ ShadowSettings ConvertShadow(const v1::Shadow& shadow, const ServerLimits& limit
       FromProto(kSpacings, shadow.spacing(), converted.spacing, path + ".spacing", checks);
   converted.compositor = FromProto(kCompositors, shadow.compositor(), converted.compositor,
                                    path + ".compositor", checks);
-  const auto default_size =
-      std::min<uint32_t>(converted.light_buffer_size, limits.max_light_buffer_size);
+  converted.max_light_buffer_size = static_cast<int>(limits.max_light_buffer_size);
   converted.light_buffer_size = static_cast<int>(
-      checks.InRangeOr(path + ".light_buffer_size", shadow.light_buffer_size(), default_size,
+      checks.InRangeOr(path + ".light_buffer_size", shadow.light_buffer_size(), 0U,
                        {.low = static_cast<double>(kMinLightBufferSize),
                         .high = static_cast<double>(limits.max_light_buffer_size)}));
   if (shadow.has_fit_degree()) {

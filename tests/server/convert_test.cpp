@@ -43,7 +43,8 @@ TEST(ConvertRequest, FillsInTheDefaultsOfTheManual) {
   EXPECT_EQ(scene.material.ambient, glm::vec3(0.1F));
   EXPECT_EQ(scene.shadow.slices, 128);
   EXPECT_TRUE(scene.shadow.interpolate);
-  EXPECT_EQ(scene.shadow.light_buffer_size, 512);
+  EXPECT_EQ(scene.shadow.light_buffer_size, 0);  // left to the plan
+  EXPECT_EQ(scene.shadow.max_light_buffer_size, 4096);
   EXPECT_EQ(scene.lights[0].color, glm::vec3(1.0F));
   EXPECT_EQ(scene.lights[0].shadow_density, glm::vec3(1.0F));
   EXPECT_EQ(scene.sampling.supersample, 1);
