@@ -184,10 +184,9 @@ void AddShadowFlags(CLI::App& app, RenderOptions& options) {
       {{"raster", v1::SLICE_COMPOSITOR_RASTER}, {"tiles", v1::SLICE_COMPOSITOR_TILES}},
       "What slices are drawn by: the blend units, or tiles in compute shaders; default: tiles on "
       "GPUs, raster on CPUs");
-  AddCount(
-      app, "--light-buffer", options.light_buffer_size, 16, 65536,
-      "Width and height of the light buffer in texels; default: half-angle 512, others by "
-      "the particles' radii, 64 to 1024");
+  AddCount(app, "--light-buffer", options.light_buffer_size, 16, 65536,
+           "Width and height of the light buffer in texels; default: half-angle 512, others by "
+           "the particles' radii, 64 to 1024");
   AddChoice<v1::BlurMode>(
       app, "--blur", options.blur_mode,
       {{"distance", v1::BLUR_MODE_DISTANCE}, {"texels", v1::BLUR_MODE_TEXELS_PER_SLICE}},
