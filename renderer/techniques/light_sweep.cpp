@@ -15,12 +15,6 @@ bool IsCutIntoSlabs(const FrameRequest& request) {
   return request.scene.scatters() || Shows(request, ImageKind::kLightLayers);
 }
 
-bool DrawsOnDevice(const DrawContext& context) {
-  const SweepOn where = context.request.sweep_on;
-  return where == SweepOn::kDevice ||
-         (where == SweepOn::kAuto && !context.device.software && !IsCutIntoSlabs(context.request));
-}
-
 }  // namespace
 
 absl::Status LightSweep::Check(const FrameRequest& request) const {
