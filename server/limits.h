@@ -24,6 +24,11 @@ struct ServerLimits {
   uint64_t max_output_bytes = 1 * kGiB;
   uint64_t max_message_bytes = 2 * kMiB;
   uint32_t max_queued_frames = 64;
+  uint32_t max_client_frames = 48;
+  uint64_t max_frame_bytes = 4 * kGiB;
+  uint32_t max_frame_seconds = 600;
+  uint32_t max_stall_seconds = 60;
+  uint32_t max_calls = 4096;
   // Samples times particles: about a minute on two cores where particles overlap a few hundred
   // deep.
   uint64_t max_reference_work = 400'000'000'000;

@@ -76,6 +76,19 @@ int Fail(int code, const absl::Status& status) {
   return code;
 }
 
+PipelineOptions PipelineOptionsOf(const Options& options, const ServerLimits& limits) {
+  PipelineOptions pipeline{.max_queued_frames = limits.max_queued_frames,
+                           .max_client_frames = limits.max_client_frames,
+                           .max_frame_bytes = limits.max_frame_bytes,
+                           .encode_threads = options.encode_threads,
+                           .warm_up = true,
+                           .server_version = kVersion};
+  if (limits.max_frame_seconds > 0) {
+    pipeline.max_frame_time = std::chrono::seconds(limits.max_frame_seconds);
+  }
+  return pipeline;
+}
+
 int Run(const Options& options, const sigset_t& signals) {
   auto engine =
       StartRenderThread({.device = options.device,
@@ -94,10 +107,7 @@ int Run(const Options& options, const sigset_t& signals) {
   const std::string version = kVersion;
   ParticleStore store(limits.max_cache_bytes);
   ByteBudget upload_memory(limits.max_cache_bytes);
-  FramePipeline pipeline(**engine, {.max_queued_frames = limits.max_queued_frames,
-                                    .encode_threads = options.encode_threads,
-                                    .warm_up = true,
-                                    .server_version = version});
+  FramePipeline pipeline(**engine, PipelineOptionsOf(options, limits));
   auto server = GrpcServer::Start(options.addresses,
                                   {device, limits, version, store, upload_memory, pipeline});
   if (!server.ok()) {

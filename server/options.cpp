@@ -80,6 +80,15 @@ void AddFlags(CLI::App& app, Options& options) {
          "REFERENCE, and to measure errors");
   number("--max-queued-frames", limits.max_queued_frames,
          "Frames waiting, rendering or encoding, of all clients together");
+  number("--max-client-frames", limits.max_client_frames, "Of these, frames of one client");
+  bytes("--max-frame-bytes", limits.max_frame_bytes,
+        "Pixels and files of all frames from when they are accepted until they are sent");
+  number("--max-frame-seconds", limits.max_frame_seconds,
+         "How long a frame may take once its rendering has begun; 0: no limit");
+  number("--max-stall-seconds", limits.max_stall_seconds,
+         "How long a client may leave unread what is sent to it, or an upload unsent, before its "
+         "call is ended; 0: for ever");
+  number("--max-calls", limits.max_calls, "Calls under way");
   bytes("--max-message-bytes", limits.max_message_bytes, "Largest message received");
 }
 
@@ -128,6 +137,14 @@ absl::Status Check(const Options& options) {
   checks.InRange("--max-outputs", limits.max_outputs, {.low = 1.0, .high = 1024.0});
   checks.InRange("--max-output-bytes", limits.max_output_bytes, {.low = 1.0});
   checks.InRange("--max-queued-frames", limits.max_queued_frames, {.low = 1.0, .high = 65536.0});
+  checks.InRange("--max-client-frames", limits.max_client_frames, {.low = 1.0, .high = 65536.0});
+  checks.InRange("--max-frame-seconds", limits.max_frame_seconds, {.low = 0.0, .high = 86400.0});
+  checks.InRange("--max-stall-seconds", limits.max_stall_seconds, {.low = 0.0, .high = 86400.0});
+  checks.InRange("--max-calls", limits.max_calls, {.low = 1.0, .high = 1e6});
+  if (limits.max_frame_bytes < limits.max_output_bytes) {
+    checks.Reject("--max-frame-bytes", fmt::format("{}", limits.max_frame_bytes),
+                  fmt::format("at least --max-output-bytes, {}", limits.max_output_bytes));
+  }
   // Room for a chunk of 64 KiB, the smallest that particles.proto recommends, and what is round it.
   checks.InRange("--max-reference-work", limits.max_reference_work, {.low = 0.0});
   checks.InRange("--max-message-bytes", limits.max_message_bytes,

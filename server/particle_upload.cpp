@@ -6,7 +6,7 @@
 #include <fmt/format.h>
 
 #include "server/convert/field_checks.h"
-#include "server/retry_hint.h"
+#include "server/error_detail.h"
 #include "server/status_text.h"
 
 namespace halflight {
@@ -16,17 +16,16 @@ ParticleUpload::ParticleUpload(ParticleStore& store, ByteBudget& memory, const S
 
 absl::Status ParticleUpload::Receive(const v1::UploadParticlesRequest& message) {
   if (response_.has_value()) {
-    return absl::InvalidArgumentError("part: a message after finish, allowed: end of the stream");
+    return FieldError("part", "a message after finish", "end of the stream");
   }
   using Request = v1::UploadParticlesRequest;
   const bool begun = assembler_.has_value();
   if (!begun && message.part_case() != Request::kHeader) {
-    return absl::InvalidArgumentError("part: no header yet, allowed: header first");
+    return FieldError("part", "no header yet", "header first");
   }
   switch (message.part_case()) {
     case Request::kHeader:
-      return begun ? absl::InvalidArgumentError(
-                         "part: a second header, allowed: chunk or finish after the header")
+      return begun ? FieldError("part", "a second header", "chunk or finish after the header")
                    : Begin(message.header());
     case Request::kChunk:
       return Append(message.chunk());
@@ -35,7 +34,7 @@ absl::Status ParticleUpload::Receive(const v1::UploadParticlesRequest& message) 
     case Request::PART_NOT_SET:
       break;
   }
-  return absl::InvalidArgumentError("part: unset, allowed: header, chunk or finish");
+  return FieldError("part", "unset", "header, chunk or finish");
 }
 
 absl::Status ParticleUpload::Begin(const v1::ParticleSetDescription& header) {
@@ -64,7 +63,8 @@ absl::Status ParticleUpload::Append(std::string_view bytes) {
   // An upload never holds more than the payload, whatever is sent: the assembler refuses the rest.
   if (assembler_->received_bytes() + bytes.size() <= assembler_->payload_bytes() &&
       !memory_.Grow(bytes.size())) {
-    return BusyError("the memory for uploads in progress is used up: retry later");
+    return BusyError(v1::ERROR_REASON_UPLOAD_MEMORY_FULL,
+                     "the memory for uploads in progress is used up: retry later");
   }
   return assembler_->Append(bytes);
 }
@@ -84,8 +84,10 @@ absl::Status ParticleUpload::Finish(const v1::UploadFinish& finish) {
   }
   NamedParticles particles = assembler_->Finish();
   if (particles.sha256 != header_.sha256()) {
-    return absl::DataLossError(fmt::format("header.sha256: {}, but what arrived has {}",
-                                           ToHex(header_.sha256()), ToHex(particles.sha256)));
+    return WithReason(
+        absl::DataLossError(fmt::format("header.sha256: {}, but what arrived has {}",
+                                        ToHex(header_.sha256()), ToHex(particles.sha256))),
+        v1::ERROR_REASON_CHECKSUM_MISMATCH);
   }
   store_.Insert(particles.sha256, std::move(particles.set));
   memory_.Release();
@@ -97,9 +99,8 @@ absl::Status ParticleUpload::AtEndOfStream() const {
   if (response_.has_value()) {
     return absl::OkStatus();
   }
-  return absl::InvalidArgumentError(
-      "part: the stream ended (or a message could not be read) before finish, allowed: header, "
-      "chunks, finish");
+  return FieldError("part", "the stream ended (or a message could not be read) before finish",
+                    "header, chunks, finish");
 }
 
 absl::StatusOr<NamedParticles> BuildInlineParticles(const v1::InlineParticles& particles,
@@ -115,7 +116,7 @@ absl::StatusOr<NamedParticles> BuildInlineParticles(const v1::InlineParticles& p
   }
   ParticleAssembler assembler(particles.layout(), *bytes);
   if (const absl::Status status = assembler.Append(particles.payload()); !status.ok()) {
-    return Prefixed(path + ".", status);
+    return Within(path + ".", status);
   }
   return assembler.Finish();
 }

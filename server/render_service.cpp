@@ -1,16 +1,22 @@
 #include "server/render_service.h"
 
 #include <atomic>
+#include <chrono>
 #include <optional>
 #include <utility>
 
+#include <fmt/format.h>
+
 #include "absl/status/status.h"
 #include "halflight/v1/service.grpc.pb.h"
+#include "server/caller.h"
+#include "server/error_detail.h"
 #include "server/handlers/find_missing_particles.h"
 #include "server/handlers/get_server_info.h"
 #include "server/handlers/render_frame.h"
 #include "server/handlers/render_sequence.h"
 #include "server/handlers/upload_particles.h"
+#include "server/stall_guard.h"
 #include "server/status_to_grpc.h"
 
 // The callback API deletes a reactor in OnDone, which comes after Finish and after every reaction
@@ -34,9 +40,18 @@ struct CallCount {
 // calls can be sure that none slips in.
 class CallToken {
  public:
-  explicit CallToken(CallCount& count) : count_(count) {
-    ++count_.active;
+  CallToken(CallCount& count, const ServerLimits& limits) : count_(count) {
     ++count_.begun;
+    if (++count_.active > static_cast<int64_t>(limits.max_calls)) {
+      refusal_ = BusyError(v1::ERROR_REASON_TOO_MANY_CALLS,
+                           fmt::format("{} calls are under way, allowed: at most {}: retry later",
+                                       count_.active - 1, limits.max_calls));
+    }
+    if (count_.draining) {
+      refusal_ = WithReason(
+          absl::UnavailableError("the server is shutting down: retry elsewhere or later"),
+          v1::ERROR_REASON_DRAINING);
+    }
   }
   ~CallToken() { --count_.active; }
   CallToken(const CallToken&) = delete;
@@ -44,29 +59,46 @@ class CallToken {
   CallToken(CallToken&&) = delete;
   CallToken& operator=(CallToken&&) = delete;
 
-  [[nodiscard]] bool refused() const { return count_.draining; }
+  // Why the call is not served, or OK.
+  [[nodiscard]] const absl::Status& refusal() const { return refusal_; }
 
  private:
   CallCount& count_;
+  absl::Status refusal_;
 };
 
-absl::Status DrainingError() {
-  return absl::UnavailableError("the server is shutting down: retry elsewhere or later");
+// What all calls of a service share.
+struct Shared {
+  const Backend backend;
+  CallCount count;
+  Timer timer;
+};
+
+std::chrono::seconds StallLimit(const Backend& backend) {
+  return std::chrono::seconds(backend.limits.max_stall_seconds);
+}
+
+std::string ClientOf(const CallbackServerContext& context) {
+  return Caller{.peer = context.peer()}.client();
 }
 
 class UploadCall final : public grpc::ServerReadReactor<v1::UploadParticlesRequest> {
  public:
-  UploadCall(const Backend& backend, CallCount& count, CallbackServerContext& context,
-             v1::UploadParticlesResponse& response)
-      : token_(count), context_(context), response_(response), handler_(backend) {
-    if (token_.refused()) {
-      Answer(DrainingError());
+  UploadCall(Shared& shared, CallbackServerContext& context, v1::UploadParticlesResponse& response)
+      : token_(shared.count, shared.backend.limits),
+        context_(context),
+        response_(response),
+        handler_(shared.backend),
+        stall_(shared.timer, StallLimit(shared.backend), context) {
+    if (!token_.refusal().ok()) {
+      Answer(token_.refusal());
     } else {
-      StartRead(&request_);
+      Read();
     }
   }
 
   void OnReadDone(bool ok) override {
+    stall_.End();
     if (!ok) {
       Answer(handler_.OnEndOfRequests());
       return;
@@ -74,13 +106,18 @@ class UploadCall final : public grpc::ServerReadReactor<v1::UploadParticlesReque
     if (const auto answer = handler_.OnRequest(request_)) {
       Answer(*answer);
     } else {
-      StartRead(&request_);
+      Read();
     }
   }
 
   void OnDone() override { delete this; }
 
  private:
+  void Read() {
+    stall_.Begin();
+    StartRead(&request_);
+  }
+
   void Answer(const UploadParticlesHandler::Answer& answer) {
     if (answer.ok()) {
       response_ = *answer;
@@ -92,6 +129,7 @@ class UploadCall final : public grpc::ServerReadReactor<v1::UploadParticlesReque
   CallbackServerContext& context_;
   v1::UploadParticlesResponse& response_;
   UploadParticlesHandler handler_;
+  StallGuard stall_;
   v1::UploadParticlesRequest request_;
 };
 
@@ -100,28 +138,36 @@ class RenderFrameCall final : public grpc::ServerWriteReactor<v1::RenderFrameRes
   using Reactor = grpc::ServerWriteReactor<v1::RenderFrameResponse>;
 
  public:
-  RenderFrameCall(const Backend& backend, CallCount& count, CallbackServerContext& context,
+  RenderFrameCall(Shared& shared, CallbackServerContext& context,
                   const v1::RenderFrameRequest& request)
-      : token_(count),
+      : token_(shared.count, shared.backend.limits),
         context_(context),
-        handler_(std::make_shared<RenderFrameHandler>(backend, *this)) {
-    if (token_.refused()) {
-      RenderFrameCall::Finish(DrainingError());
+        stall_(shared.timer, StallLimit(shared.backend), context),
+        handler_(std::make_shared<RenderFrameHandler>(shared.backend, *this, ClientOf(context))) {
+    if (!token_.refusal().ok()) {
+      RenderFrameCall::Finish(token_.refusal());
     } else {
       handler_->Start(request);
     }
   }
 
-  void OnWriteDone(bool ok) override { handler_->OnWritten(ok); }
+  void OnWriteDone(bool ok) override {
+    stall_.End();
+    handler_->OnWritten(ok);
+  }
   void OnCancel() override { handler_->OnCancel(); }
   void OnDone() override { delete this; }
 
  private:
-  void Write(const v1::RenderFrameResponse& message) override { StartWrite(&message); }
+  void Write(const v1::RenderFrameResponse& message) override {
+    stall_.Begin();
+    StartWrite(&message);
+  }
   void Finish(const absl::Status& status) override { Reactor::Finish(ToGrpc(status, context_)); }
 
   const CallToken token_;
   CallbackServerContext& context_;
+  StallGuard stall_;
   const std::shared_ptr<RenderFrameHandler> handler_;
 };
 
@@ -131,12 +177,14 @@ class RenderSequenceCall final
   using Reactor = grpc::ServerBidiReactor<v1::RenderSequenceRequest, v1::RenderSequenceResponse>;
 
  public:
-  RenderSequenceCall(const Backend& backend, CallCount& count, CallbackServerContext& context)
-      : token_(count),
+  RenderSequenceCall(Shared& shared, CallbackServerContext& context)
+      : token_(shared.count, shared.backend.limits),
         context_(context),
-        handler_(std::make_shared<RenderSequenceHandler>(backend, *this)) {
-    if (token_.refused()) {
-      RenderSequenceCall::Finish(DrainingError());
+        stall_(shared.timer, StallLimit(shared.backend), context),
+        handler_(
+            std::make_shared<RenderSequenceHandler>(shared.backend, *this, ClientOf(context))) {
+    if (!token_.refusal().ok()) {
+      RenderSequenceCall::Finish(token_.refusal());
     } else {
       handler_->Start();
     }
@@ -149,17 +197,24 @@ class RenderSequenceCall final
       handler_->OnEndOfRequests();
     }
   }
-  void OnWriteDone(bool ok) override { handler_->OnWritten(ok); }
+  void OnWriteDone(bool ok) override {
+    stall_.End();
+    handler_->OnWritten(ok);
+  }
   void OnCancel() override { handler_->OnCancel(); }
   void OnDone() override { delete this; }
 
  private:
   void Read() override { StartRead(&request_); }
-  void Write(const v1::RenderSequenceResponse& message) override { StartWrite(&message); }
+  void Write(const v1::RenderSequenceResponse& message) override {
+    stall_.Begin();
+    StartWrite(&message);
+  }
   void Finish(const absl::Status& status) override { Reactor::Finish(ToGrpc(status, context_)); }
 
   const CallToken token_;
   CallbackServerContext& context_;
+  StallGuard stall_;
   const std::shared_ptr<RenderSequenceHandler> handler_;
   v1::RenderSequenceRequest request_;
 };
@@ -168,15 +223,15 @@ class RenderSequenceCall final
 
 class RenderService::Calls final : public v1::RenderService::CallbackService {
  public:
-  explicit Calls(const Backend& backend) : backend_(backend) {}
+  explicit Calls(const Backend& backend) : shared_{.backend = backend} {}
 
-  CallCount& count() { return count_; }
+  CallCount& count() { return shared_.count; }
 
   grpc::ServerUnaryReactor* GetServerInfo(CallbackServerContext* context,
                                           const v1::GetServerInfoRequest* /*request*/,
                                           v1::GetServerInfoResponse* response) override {
     return AnswerAtOnce(*context, *response, [&]() -> absl::StatusOr<v1::GetServerInfoResponse> {
-      return halflight::GetServerInfo(backend_);
+      return halflight::GetServerInfo(shared_.backend);
     });
   }
 
@@ -184,31 +239,31 @@ class RenderService::Calls final : public v1::RenderService::CallbackService {
       CallbackServerContext* context, const v1::FindMissingParticlesRequest* request,
       v1::FindMissingParticlesResponse* response) override {
     return AnswerAtOnce(*context, *response,
-                        [&] { return halflight::FindMissingParticles(backend_, *request); });
+                        [&] { return halflight::FindMissingParticles(shared_.backend, *request); });
   }
 
   grpc::ServerReadReactor<v1::UploadParticlesRequest>* UploadParticles(
       CallbackServerContext* context, v1::UploadParticlesResponse* response) override {
-    return new UploadCall(backend_, count_, *context, *response);
+    return new UploadCall(shared_, *context, *response);
   }
 
   grpc::ServerWriteReactor<v1::RenderFrameResponse>* RenderFrame(
       CallbackServerContext* context, const v1::RenderFrameRequest* request) override {
-    return new RenderFrameCall(backend_, count_, *context, *request);
+    return new RenderFrameCall(shared_, *context, *request);
   }
 
   grpc::ServerBidiReactor<v1::RenderSequenceRequest, v1::RenderSequenceResponse>* RenderSequence(
       CallbackServerContext* context) override {
-    return new RenderSequenceCall(backend_, count_, *context);
+    return new RenderSequenceCall(shared_, *context);
   }
 
  private:
   template <typename Response, typename Handler>
   grpc::ServerUnaryReactor* AnswerAtOnce(CallbackServerContext& context, Response& response,
                                          const Handler& handler) {
-    const CallToken token(count_);
-    absl::Status status = DrainingError();
-    if (!token.refused()) {
+    const CallToken token(shared_.count, shared_.backend.limits);
+    absl::Status status = token.refusal();
+    if (status.ok()) {
       auto answer = handler();
       status = answer.status();
       if (answer.ok()) {
@@ -220,8 +275,7 @@ class RenderService::Calls final : public v1::RenderService::CallbackService {
     return reactor;
   }
 
-  const Backend backend_;
-  CallCount count_;
+  Shared shared_;
 };
 
 RenderService::RenderService(const Backend& backend) : calls_(std::make_unique<Calls>(backend)) {}

@@ -22,6 +22,8 @@ namespace halflight {
 // A frame to make.
 struct FrameJob {
   std::string request_id;
+  std::string client;  // whose share of the renderer it takes; see caller.h
+  int priority = 0;    // among the frames of that client
   std::string particle_sha256;
   FrameRequest request;
   std::vector<OutputJob> outputs;

@@ -24,6 +24,11 @@ v1::GetServerInfoResponse GetServerInfo(const Backend& backend) {
   told.set_max_output_bytes(limits.max_output_bytes);
   told.set_max_message_bytes(limits.max_message_bytes);
   told.set_max_queued_frames(limits.max_queued_frames);
+  told.set_max_client_frames(limits.max_client_frames);
+  told.set_max_frame_bytes(limits.max_frame_bytes);
+  told.set_max_frame_seconds(limits.max_frame_seconds);
+  told.set_max_stall_seconds(limits.max_stall_seconds);
+  told.set_max_calls(limits.max_calls);
 
   for (const auto& row : kTechniques) {
     response.add_techniques(row.proto);

@@ -4,6 +4,8 @@
 #include <memory>
 #include <optional>
 #include <stop_token>
+#include <string>
+#include <utility>
 
 #include "halflight/v1/service.pb.h"
 #include "server/handlers/backend.h"
@@ -16,8 +18,10 @@ namespace halflight {
 // it is finished.
 class RenderFrameHandler : public std::enable_shared_from_this<RenderFrameHandler> {
  public:
-  RenderFrameHandler(const Backend& backend, ResponseSink<v1::RenderFrameResponse>& sink)
-      : backend_(backend), sink_(sink) {}
+  // `client` is the caller's; see caller.h.
+  RenderFrameHandler(const Backend& backend, ResponseSink<v1::RenderFrameResponse>& sink,
+                     std::string client)
+      : backend_(backend), sink_(sink), client_(std::move(client)) {}
 
   // Once, first.
   void Start(const v1::RenderFrameRequest& request);
@@ -34,6 +38,7 @@ class RenderFrameHandler : public std::enable_shared_from_this<RenderFrameHandle
 
   const Backend backend_;
   ResponseSink<v1::RenderFrameResponse>& sink_;
+  const std::string client_;
   std::stop_source stop_;
   // From here on touched by one thread at a time: each step of the call starts the next.
   std::optional<FrameMessages> messages_;

@@ -1,7 +1,5 @@
 #include "server/handlers/render_sequence.h"
 
-#include <algorithm>
-#include <iterator>
 #include <string>
 #include <utility>
 
@@ -21,6 +19,7 @@ void RenderSequenceHandler::OnRequest(const v1::RenderSequenceRequest& request) 
     slots_.push_back(std::make_shared<Slot>());
     slots_.back()->index = next_index_++;
     if (job.ok()) {
+      job->client = client_;
       waiting_ = *std::move(job);
       may_submit_ = true;
     } else {
@@ -38,12 +37,6 @@ void RenderSequenceHandler::Refuse(Slot& slot, const std::string& request_id,
   requests_ended_ = true;
 }
 
-// Under the mutex.
-bool RenderSequenceHandler::HasFramesUnderWay() const {
-  return std::any_of(slots_.begin(), std::prev(slots_.end()),
-                     [](const auto& slot) { return !slot->result.has_value(); });
-}
-
 // By the thread that advances: hands the frame that waits to the pipeline.
 void RenderSequenceHandler::Submit() {
   std::unique_lock lock(mutex_);
@@ -55,8 +48,8 @@ void RenderSequenceHandler::Submit() {
         self->OnFrame(*slot, std::move(frame));
       });
   lock.lock();
-  // With frames of its own in the queue, or just out of it, the stream tries again.
-  if (absl::IsResourceExhausted(status) && (HasFramesUnderWay() || may_submit_)) {
+  // With frames of its own before it, or just sent, the stream tries again.
+  if (absl::IsResourceExhausted(status) && (slots_.size() > 1 || may_submit_)) {
     return;
   }
   if (!status.ok()) {
@@ -163,6 +156,7 @@ RenderSequenceHandler::Step RenderSequenceHandler::NextStep() {
       }
       messages_.reset();
       slots_.pop_front();
+      may_submit_ = true;
       return NextStep();
     }
   }

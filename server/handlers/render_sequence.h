@@ -10,6 +10,7 @@
 #include <optional>
 #include <stop_token>
 #include <string>
+#include <utility>
 
 #include "halflight/v1/service.pb.h"
 #include "server/handlers/backend.h"
@@ -30,11 +31,14 @@ inline constexpr size_t kFramesAhead = 4;
 // and calls Advance, which lets one thread at a time do what follows, without the mutex: so the
 // sink is never called by two at once, and never after Finish.
 //
-// A stream never fails because its own frames fill the queue: the next one then waits for them.
+// A stream never fails because its own frames fill the queue, or the memory for frames: the next
+// one then waits until they are sent.
 class RenderSequenceHandler : public std::enable_shared_from_this<RenderSequenceHandler> {
  public:
-  RenderSequenceHandler(const Backend& backend, DuplexSink<v1::RenderSequenceResponse>& sink)
-      : backend_(backend), sink_(sink) {}
+  // `client` is the caller's; see caller.h.
+  RenderSequenceHandler(const Backend& backend, DuplexSink<v1::RenderSequenceResponse>& sink,
+                        std::string client)
+      : backend_(backend), sink_(sink), client_(std::move(client)) {}
 
   // Once, first.
   void Start() { Advance(); }
@@ -57,7 +61,6 @@ class RenderSequenceHandler : public std::enable_shared_from_this<RenderSequence
 
   void Refuse(Slot& slot, const std::string& request_id, const absl::Status& status);
   void Submit();
-  [[nodiscard]] bool HasFramesUnderWay() const;
   void OnFrame(Slot& slot, FrameOrError result);
   void End(const absl::Status& status);
   void Advance();
@@ -65,6 +68,7 @@ class RenderSequenceHandler : public std::enable_shared_from_this<RenderSequence
 
   const Backend backend_;
   DuplexSink<v1::RenderSequenceResponse>& sink_;
+  const std::string client_;
   std::stop_source stop_;
 
   // Touched only by the thread that completes a read; reads are one at a time.

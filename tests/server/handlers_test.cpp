@@ -11,12 +11,12 @@
 #include <gtest/gtest.h>
 
 #include "halflight/crc32c.h"
+#include "server/error_detail.h"
 #include "server/handlers/find_missing_particles.h"
 #include "server/handlers/get_server_info.h"
 #include "server/handlers/render_frame.h"
 #include "server/handlers/render_sequence.h"
 #include "server/handlers/upload_particles.h"
-#include "server/retry_hint.h"
 #include "tests/process/wait_for.h"
 #include "tests/server/fake_engine.h"
 
@@ -162,7 +162,7 @@ TEST_F(Handlers, FrameArrivesAsHeaderChunksWithoutGapsAndTrailer) {
   request.mutable_scene()->mutable_camera()->set_height(200);
   request.add_outputs()->set_kind(v1::OUTPUT_KIND_DEPTH);
   FakeSink<v1::RenderFrameResponse> sink;
-  const auto handler = std::make_shared<RenderFrameHandler>(backend_, sink);
+  const auto handler = std::make_shared<RenderFrameHandler>(backend_, sink, "client");
   handler->Start(request);
   while (sink.WaitForWrite()) {
     handler->OnWritten(true);
@@ -195,7 +195,7 @@ TEST_F(Handlers, InvalidFrameIsRefusedWithoutRendering) {
   v1::RenderFrameRequest request = MakeRequest();
   request.clear_outputs();
   FakeSink<v1::RenderFrameResponse> sink;
-  const auto handler = std::make_shared<RenderFrameHandler>(backend_, sink);
+  const auto handler = std::make_shared<RenderFrameHandler>(backend_, sink, "client");
   handler->Start(request);
   ASSERT_TRUE(sink.finished().has_value());
   EXPECT_EQ(sink.finished()->code(), absl::StatusCode::kInvalidArgument);
@@ -205,7 +205,7 @@ TEST_F(Handlers, InvalidFrameIsRefusedWithoutRendering) {
 TEST_F(Handlers, CancelledFrameEndsAsCancelled) {
   engine_.SetGate(false);
   FakeSink<v1::RenderFrameResponse> sink;
-  const auto handler = std::make_shared<RenderFrameHandler>(backend_, sink);
+  const auto handler = std::make_shared<RenderFrameHandler>(backend_, sink, "client");
   handler->Start(MakeRequest());
   handler->OnCancel();
   EXPECT_FALSE(sink.WaitForWrite());
@@ -214,7 +214,7 @@ TEST_F(Handlers, CancelledFrameEndsAsCancelled) {
 
 TEST_F(Handlers, PeerThatLeavesInTheMiddleEndsTheFrame) {
   FakeSink<v1::RenderFrameResponse> sink;
-  const auto handler = std::make_shared<RenderFrameHandler>(backend_, sink);
+  const auto handler = std::make_shared<RenderFrameHandler>(backend_, sink, "client");
   handler->Start(MakeRequest());
   ASSERT_TRUE(sink.WaitForWrite());
   handler->OnWritten(false);
@@ -273,7 +273,7 @@ class Sequence : public Handlers {
 
   FakeSink<v1::RenderSequenceResponse> sink_;
   std::shared_ptr<RenderSequenceHandler> handler_ =
-      std::make_shared<RenderSequenceHandler>(backend_, sink_);
+      std::make_shared<RenderSequenceHandler>(backend_, sink_, "client");
 };
 
 TEST_F(Sequence, FramesComeWholeAndInOrder) {
@@ -362,7 +362,7 @@ TEST_F(Sequence, ParticlesOfTheStreamSurviveTheirEviction) {
   Backend backend{engine_.device(), limits_, version_, small, upload_memory_, pipeline_};
   const auto particles = BuildInlineParticles(MakeRequest().scene().inline_particles(), limits_);
   small.Insert(particles->sha256, particles->set);
-  handler_ = std::make_shared<RenderSequenceHandler>(backend, sink_);
+  handler_ = std::make_shared<RenderSequenceHandler>(backend, sink_, "client");
   v1::RenderFrameRequest first = MakeRequest();
   first.mutable_scene()->set_particle_sha256(particles->sha256);
   handler_->Start();
@@ -403,7 +403,7 @@ TEST_F(Sequence, FullQueueKeepsItsHint) {
   engine_.RefuseWith(absl::ResourceExhaustedError("full"));
   Play({Wrap(MakeRequest())});
   EXPECT_EQ(sink_.finished()->code(), absl::StatusCode::kResourceExhausted);
-  EXPECT_TRUE(RetryHint(*sink_.finished()).has_value());
+  EXPECT_TRUE(DetailOf(*sink_.finished()).retry_after.has_value());
 }
 
 TEST_F(Sequence, SlowReaderStopsTheReadingAhead) {
@@ -454,7 +454,7 @@ TEST_F(Sequence, PeerThatLeavesDuringAWriteEndsTheStream) {
 TEST_F(Sequence, CancellationAtAnyMomentFinishesOnce) {
   for (int round = 0; round < 200; ++round) {
     FakeSink<v1::RenderSequenceResponse> sink;
-    auto handler = std::make_shared<RenderSequenceHandler>(backend_, sink);
+    auto handler = std::make_shared<RenderSequenceHandler>(backend_, sink, "client");
     handler->Start();
     handler->OnRequest(Wrap(MakeRequest()));
     std::jthread canceller([&, round] {
