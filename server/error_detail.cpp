@@ -22,9 +22,10 @@ std::string PayloadOf(const absl::Status& status, const char* name) {
 }  // namespace
 
 ErrorDetail DetailOf(const absl::Status& status) {
-  ErrorDetail detail{.field = PayloadOf(status, kFieldPayload),
-                     .value = PayloadOf(status, kValuePayload),
-                     .allowed = PayloadOf(status, kAllowedPayload)};
+  ErrorDetail detail;
+  detail.field = PayloadOf(status, kFieldPayload);
+  detail.value = PayloadOf(status, kValuePayload);
+  detail.allowed = PayloadOf(status, kAllowedPayload);
   if (!v1::ErrorReason_Parse(PayloadOf(status, kReasonPayload), &detail.reason) &&
       !detail.field.empty()) {
     detail.reason = v1::ERROR_REASON_INVALID_FIELD;

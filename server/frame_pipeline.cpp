@@ -115,7 +115,7 @@ absl::Status FramePipeline::Admit(const FrameJob& job, Flight& flight) {
     return BusyError(v1::ERROR_REASON_QUEUE_FULL,
                      fmt::format("the queue is full ({} frames): retry later", queued_));
   }
-  const auto own = queued_of_.find(job.client);
+  const auto own = queued_of_.find(job.caller.client());
   if (own != queued_of_.end() && own->second >= options_.max_client_frames) {
     return BusyError(v1::ERROR_REASON_CLIENT_QUEUE_FULL,
                      fmt::format("{} frames of this client are under way, allowed: at most {}: "
@@ -129,7 +129,7 @@ absl::Status FramePipeline::Admit(const FrameJob& job, Flight& flight) {
                                  job.pixel_bytes, options_.max_frame_bytes, frame_memory_->left()));
   }
   ++queued_;
-  ++queued_of_[job.client];
+  ++queued_of_[job.caller.client()];
   ++flights_;
   return absl::OkStatus();
 }
@@ -204,7 +204,7 @@ void FramePipeline::NextPass(const FlightPtr& flight) {
 
 void FramePipeline::Render(const FlightPtr& flight, FrameRequest request, Stage next) {
   const size_t images = request.images.size();
-  queue_.Push({.client = flight->job.client,
+  queue_.Push({.client = flight->job.caller.client(),
                .priority = flight->job.priority,
                .goes_on = flight->rendering_begun,
                .request = std::move(request),
@@ -375,7 +375,7 @@ void FramePipeline::Complete(const FlightPtr& flight) {
   {
     const std::lock_guard lock(mutex_);
     --queued_;
-    const auto own = queued_of_.find(flight->job.client);
+    const auto own = queued_of_.find(flight->job.caller.client());
     if (--own->second == 0) {
       queued_of_.erase(own);
     }

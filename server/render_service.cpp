@@ -70,6 +70,8 @@ class CallToken {
 
 // What all calls of a service share.
 struct Shared {
+  explicit Shared(const Backend& of) : backend(of) {}
+
   const Backend backend;
   CallCount count;
   Timer timer;
@@ -79,9 +81,7 @@ std::chrono::seconds StallLimit(const Backend& backend) {
   return std::chrono::seconds(backend.limits.max_stall_seconds);
 }
 
-std::string ClientOf(const CallbackServerContext& context) {
-  return Caller{.peer = context.peer()}.client();
-}
+Caller CallerOf(const CallbackServerContext& context) { return {"", context.peer()}; }
 
 class UploadCall final : public grpc::ServerReadReactor<v1::UploadParticlesRequest> {
  public:
@@ -149,7 +149,7 @@ class RenderFrameCall final : public grpc::ServerWriteReactor<grpc::ByteBuffer>,
       : token_(shared.count, shared.backend.limits),
         context_(context),
         stall_(shared.timer, StallLimit(shared.backend), context),
-        handler_(std::make_shared<RenderFrameHandler>(shared.backend, *this, ClientOf(context))) {
+        handler_(std::make_shared<RenderFrameHandler>(shared.backend, *this, CallerOf(context))) {
     if (v1::RenderFrameRequest message; !token_.refusal().ok()) {
       RenderFrameCall::Finish(token_.refusal());
     } else if (!Parse(request, message)) {
@@ -192,7 +192,7 @@ class RenderSequenceCall final : public grpc::ServerBidiReactor<grpc::ByteBuffer
         context_(context),
         stall_(shared.timer, StallLimit(shared.backend), context),
         handler_(
-            std::make_shared<RenderSequenceHandler>(shared.backend, *this, ClientOf(context))) {
+            std::make_shared<RenderSequenceHandler>(shared.backend, *this, CallerOf(context))) {
     if (!token_.refusal().ok()) {
       RenderSequenceCall::Finish(token_.refusal());
     } else {
@@ -243,7 +243,7 @@ using CallbackService =
 
 class RenderService::Calls final : public CallbackService {
  public:
-  explicit Calls(const Backend& backend) : shared_{.backend = backend} {}
+  explicit Calls(const Backend& backend) : shared_(backend) {}
 
   CallCount& count() { return shared_.count; }
 

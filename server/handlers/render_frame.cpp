@@ -21,7 +21,7 @@ absl::Status RenderFrameHandler::Submit(const v1::RenderFrameRequest& request) {
   if (!job.ok()) {
     return job.status();
   }
-  job->client = client_;
+  job->caller = caller_;
   return backend_.pipeline.Submit(
       *std::move(job), stop_.get_token(),
       [self = shared_from_this()](const auto& frame) { self->OnFrame(frame); });

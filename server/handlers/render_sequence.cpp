@@ -26,7 +26,7 @@ void RenderSequenceHandler::Take(absl::StatusOr<FrameJob> job, const std::string
     slots_.push_back(std::make_shared<Slot>());
     slots_.back()->index = next_index_++;
     if (job.ok()) {
-      job->client = client_;
+      job->caller = caller_;
       waiting_ = *std::move(job);
       may_submit_ = true;
     } else {

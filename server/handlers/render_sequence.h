@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "halflight/v1/service.pb.h"
+#include "server/caller.h"
 #include "server/handlers/backend.h"
 #include "server/handlers/frame_messages.h"
 #include "server/handlers/sequence_state.h"
@@ -35,10 +36,9 @@ inline constexpr size_t kFramesAhead = 4;
 // one then waits until they are sent.
 class RenderSequenceHandler : public std::enable_shared_from_this<RenderSequenceHandler> {
  public:
-  // `client` is the caller's; see caller.h.
   RenderSequenceHandler(const Backend& backend, DuplexSink<v1::RenderSequenceResponse>& sink,
-                        std::string client)
-      : backend_(backend), sink_(sink), client_(std::move(client)) {}
+                        Caller caller = {})
+      : backend_(backend), sink_(sink), caller_(std::move(caller)) {}
 
   // Once, first.
   void Start() { Advance(); }
@@ -71,7 +71,7 @@ class RenderSequenceHandler : public std::enable_shared_from_this<RenderSequence
 
   const Backend backend_;
   DuplexSink<v1::RenderSequenceResponse>& sink_;
-  const std::string client_;
+  const Caller caller_;
   std::stop_source stop_;
 
   // Touched only by the thread that completes a read; reads are one at a time.

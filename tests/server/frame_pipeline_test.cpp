@@ -137,20 +137,20 @@ TEST_F(Pipeline, ClientBeyondItsShareIsRefusedAndOthersAreNot) {
   Start({.max_queued_frames = 4, .max_client_frames = 2, .encode = EncodePlain});
   engine_.SetGate(false);
   FrameJob job = MustConvert();
-  job.client = "greedy";
+  job.caller.tenant = "greedy";
   auto first = Submit(job);
   auto second = Submit(job);
   const Result third = Submit(job).get();
   EXPECT_EQ(third.status().code(), absl::StatusCode::kResourceExhausted);
   EXPECT_EQ(DetailOf(third.status()).reason, v1::ERROR_REASON_CLIENT_QUEUE_FULL);
   EXPECT_TRUE(DetailOf(third.status()).retry_after.has_value());
-  job.client = "other";
+  job.caller.tenant = "other";
   auto other = Submit(job);
   engine_.SetGate(true);
   EXPECT_TRUE(first.get().ok());
   EXPECT_TRUE(second.get().ok());
   EXPECT_TRUE(other.get().ok());
-  job.client = "greedy";
+  job.caller.tenant = "greedy";
   EXPECT_TRUE(Submit(job).get().ok());
 }
 

@@ -166,7 +166,7 @@ TEST_F(Handlers, FrameArrivesAsHeaderChunksWithoutGapsAndTrailer) {
   request.mutable_scene()->mutable_camera()->set_height(200);
   request.add_outputs()->set_kind(v1::OUTPUT_KIND_DEPTH);
   FakeSink<v1::RenderFrameResponse> sink;
-  const auto handler = std::make_shared<RenderFrameHandler>(backend_, sink, "client");
+  const auto handler = std::make_shared<RenderFrameHandler>(backend_, sink);
   handler->Start(request);
   while (sink.WaitForWrite()) {
     handler->OnWritten(true);
@@ -199,7 +199,7 @@ TEST_F(Handlers, InvalidFrameIsRefusedWithoutRendering) {
   v1::RenderFrameRequest request = MakeRequest();
   request.clear_outputs();
   FakeSink<v1::RenderFrameResponse> sink;
-  const auto handler = std::make_shared<RenderFrameHandler>(backend_, sink, "client");
+  const auto handler = std::make_shared<RenderFrameHandler>(backend_, sink);
   handler->Start(request);
   ASSERT_TRUE(sink.finished().has_value());
   EXPECT_EQ(sink.finished()->code(), absl::StatusCode::kInvalidArgument);
@@ -209,7 +209,7 @@ TEST_F(Handlers, InvalidFrameIsRefusedWithoutRendering) {
 TEST_F(Handlers, CancelledFrameEndsAsCancelled) {
   engine_.SetGate(false);
   FakeSink<v1::RenderFrameResponse> sink;
-  const auto handler = std::make_shared<RenderFrameHandler>(backend_, sink, "client");
+  const auto handler = std::make_shared<RenderFrameHandler>(backend_, sink);
   handler->Start(MakeRequest());
   handler->OnCancel();
   EXPECT_FALSE(sink.WaitForWrite());
@@ -218,7 +218,7 @@ TEST_F(Handlers, CancelledFrameEndsAsCancelled) {
 
 TEST_F(Handlers, PeerThatLeavesInTheMiddleEndsTheFrame) {
   FakeSink<v1::RenderFrameResponse> sink;
-  const auto handler = std::make_shared<RenderFrameHandler>(backend_, sink, "client");
+  const auto handler = std::make_shared<RenderFrameHandler>(backend_, sink);
   handler->Start(MakeRequest());
   ASSERT_TRUE(sink.WaitForWrite());
   handler->OnWritten(false);
@@ -277,7 +277,7 @@ class Sequence : public Handlers {
 
   FakeSink<v1::RenderSequenceResponse> sink_;
   std::shared_ptr<RenderSequenceHandler> handler_ =
-      std::make_shared<RenderSequenceHandler>(backend_, sink_, "client");
+      std::make_shared<RenderSequenceHandler>(backend_, sink_);
 };
 
 TEST_F(Sequence, FramesComeWholeAndInOrder) {
@@ -366,7 +366,7 @@ TEST_F(Sequence, ParticlesOfTheStreamSurviveTheirEviction) {
   Backend backend{engine_.device(), limits_, version_, small, upload_memory_, pipeline_};
   const auto particles = BuildInlineParticles(MakeRequest().scene().inline_particles(), limits_);
   small.Insert(particles->sha256, particles->set);
-  handler_ = std::make_shared<RenderSequenceHandler>(backend, sink_, "client");
+  handler_ = std::make_shared<RenderSequenceHandler>(backend, sink_);
   v1::RenderFrameRequest first = MakeRequest();
   first.mutable_scene()->set_particle_sha256(particles->sha256);
   handler_->Start();
@@ -472,7 +472,7 @@ TEST_F(Sequence, PeerThatLeavesDuringAWriteEndsTheStream) {
 TEST_F(Sequence, CancellationAtAnyMomentFinishesOnce) {
   for (int round = 0; round < 200; ++round) {
     FakeSink<v1::RenderSequenceResponse> sink;
-    auto handler = std::make_shared<RenderSequenceHandler>(backend_, sink, "client");
+    auto handler = std::make_shared<RenderSequenceHandler>(backend_, sink);
     handler->Start();
     handler->OnRequest(Wrap(MakeRequest()));
     std::jthread canceller([&, round] {
