@@ -8,6 +8,7 @@
 #include "halflight/v1/service.grpc.pb.h"
 #include "server/handlers/find_missing_particles.h"
 #include "server/handlers/get_server_info.h"
+#include "server/handlers/query_upload.h"
 #include "server/handlers/render_frame.h"
 #include "server/handlers/render_sequence.h"
 #include "server/handlers/upload_particles.h"
@@ -185,6 +186,13 @@ class RenderService::Calls final : public v1::RenderService::CallbackService {
       v1::FindMissingParticlesResponse* response) override {
     return AnswerAtOnce(*context, *response,
                         [&] { return halflight::FindMissingParticles(backend_, *request); });
+  }
+
+  grpc::ServerUnaryReactor* QueryUpload(CallbackServerContext* context,
+                                        const v1::QueryUploadRequest* request,
+                                        v1::QueryUploadResponse* response) override {
+    return AnswerAtOnce(*context, *response,
+                        [&] { return halflight::QueryUpload(backend_, *request); });
   }
 
   grpc::ServerReadReactor<v1::UploadParticlesRequest>* UploadParticles(

@@ -24,6 +24,9 @@ v1::GetServerInfoResponse GetServerInfo(const Backend& backend) {
   told.set_max_output_bytes(limits.max_output_bytes);
   told.set_max_message_bytes(limits.max_message_bytes);
   told.set_max_queued_frames(limits.max_queued_frames);
+  told.set_max_partial_uploads(limits.max_partial_uploads);
+  told.set_partial_upload_seconds(limits.partial_upload_seconds);
+  told.set_max_cache_dir_bytes(limits.max_cache_dir_bytes);
 
   for (const auto& row : kTechniques) {
     response.add_techniques(row.proto);
