@@ -7,7 +7,7 @@
 
 #include <gtest/gtest.h>
 
-#include "tests/server/fake_engine.h"
+#include "tests/server/made_particles.h"
 #include "tests/server/upload_messages.h"
 
 namespace halflight {

@@ -19,9 +19,10 @@
 #include "halflight/sha256.h"
 #include "server/particle_store.h"
 #include "server/particle_upload.h"
+#include "server/status_text.h"
 #include "tests/process/process.h"
 #include "tests/process/wait_for.h"
-#include "tests/server/fake_engine.h"
+#include "tests/server/made_particles.h"
 
 namespace halflight {
 namespace {
@@ -270,7 +271,7 @@ TEST_F(Files, OneServerADirectory) {
 
 TEST_F(Files, DirectoryThatCannotBeUsedIsNamed) {
   const auto message = [this](const std::string& path) {
-    return std::string(ParticleFiles::Open(path, limits_).status().message());
+    return MessageOf(ParticleFiles::Open(path, limits_).status());
   };
   EXPECT_THAT(message(folder_ / "no/such/parent"), HasSubstr("no/such/parent: cannot be made"));
   EXPECT_THAT(message(folder_.Write("file", "x")), HasSubstr("file: cannot be opened"));

@@ -10,7 +10,7 @@
 #include <grpcpp/grpcpp.h>
 
 #include "halflight/v1/service.grpc.pb.h"
-#include "tests/server/fake_engine.h"
+#include "tests/server/made_particles.h"
 #include "tests/server/upload_messages.h"
 
 int main(int argc, char** argv) {
