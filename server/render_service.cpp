@@ -12,6 +12,7 @@
 #include "server/handlers/render_frame.h"
 #include "server/handlers/render_sequence.h"
 #include "server/handlers/upload_particles.h"
+#include "server/message_buffer.h"
 #include "server/status_to_grpc.h"
 
 // The callback API deletes a reactor in OnDone, which comes after Finish and after every reaction
@@ -96,20 +97,29 @@ class UploadCall final : public grpc::ServerReadReactor<v1::UploadParticlesReque
   v1::UploadParticlesRequest request_;
 };
 
-class RenderFrameCall final : public grpc::ServerWriteReactor<v1::RenderFrameResponse>,
+// What sends frames takes messages in bytes, so that chunks need not be copied into messages first.
+template <typename Message>
+bool Parse(grpc::ByteBuffer bytes, Message& message) {
+  return grpc::SerializationTraits<Message>::Deserialize(&bytes, &message).ok();
+}
+
+class RenderFrameCall final : public grpc::ServerWriteReactor<grpc::ByteBuffer>,
                               public ResponseSink<v1::RenderFrameResponse> {
-  using Reactor = grpc::ServerWriteReactor<v1::RenderFrameResponse>;
+  using Reactor = grpc::ServerWriteReactor<grpc::ByteBuffer>;
 
  public:
   RenderFrameCall(const Backend& backend, CallCount& count, CallbackServerContext& context,
-                  const v1::RenderFrameRequest& request)
+                  const grpc::ByteBuffer& request)
       : token_(count),
         context_(context),
         handler_(std::make_shared<RenderFrameHandler>(backend, *this)) {
-    if (token_.refused()) {
+    if (v1::RenderFrameRequest message; token_.refused()) {
       RenderFrameCall::Finish(DrainingError());
+    } else if (!Parse(request, message)) {
+      RenderFrameCall::Finish(
+          absl::InvalidArgumentError("the message is not a RenderFrameRequest"));
     } else {
-      handler_->Start(request);
+      handler_->Start(message);
     }
   }
 
@@ -118,18 +128,21 @@ class RenderFrameCall final : public grpc::ServerWriteReactor<v1::RenderFrameRes
   void OnDone() override { delete this; }
 
  private:
-  void Write(const v1::RenderFrameResponse& message) override { StartWrite(&message); }
+  void Write(const OutgoingMessage<v1::RenderFrameResponse>& outgoing) override {
+    response_ = ToByteBuffer(outgoing);
+    StartWrite(&response_);
+  }
   void Finish(const absl::Status& status) override { Reactor::Finish(ToGrpc(status, context_)); }
 
   const CallToken token_;
   CallbackServerContext& context_;
   const std::shared_ptr<RenderFrameHandler> handler_;
+  grpc::ByteBuffer response_;
 };
 
-class RenderSequenceCall final
-    : public grpc::ServerBidiReactor<v1::RenderSequenceRequest, v1::RenderSequenceResponse>,
-      public DuplexSink<v1::RenderSequenceResponse> {
-  using Reactor = grpc::ServerBidiReactor<v1::RenderSequenceRequest, v1::RenderSequenceResponse>;
+class RenderSequenceCall final : public grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer>,
+                                 public DuplexSink<v1::RenderSequenceResponse> {
+  using Reactor = grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer>;
 
  public:
   RenderSequenceCall(const Backend& backend, CallCount& count, CallbackServerContext& context)
@@ -144,10 +157,12 @@ class RenderSequenceCall final
   }
 
   void OnReadDone(bool ok) override {
-    if (ok) {
-      handler_->OnRequest(request_);
-    } else {
+    if (v1::RenderSequenceRequest message; !ok) {
       handler_->OnEndOfRequests();
+    } else if (!Parse(request_, message)) {
+      handler_->OnUnreadableRequest();
+    } else {
+      handler_->OnRequest(message);
     }
   }
   void OnWriteDone(bool ok) override { handler_->OnWritten(ok); }
@@ -156,18 +171,28 @@ class RenderSequenceCall final
 
  private:
   void Read() override { StartRead(&request_); }
-  void Write(const v1::RenderSequenceResponse& message) override { StartWrite(&message); }
+  void Write(const OutgoingMessage<v1::RenderSequenceResponse>& outgoing) override {
+    response_ = ToByteBuffer(outgoing);
+    StartWrite(&response_);
+  }
   void Finish(const absl::Status& status) override { Reactor::Finish(ToGrpc(status, context_)); }
 
   const CallToken token_;
   CallbackServerContext& context_;
   const std::shared_ptr<RenderSequenceHandler> handler_;
-  v1::RenderSequenceRequest request_;
+  grpc::ByteBuffer request_;
+  grpc::ByteBuffer response_;
 };
+
+using Rpcs = v1::RenderService;
+using CallbackService = Rpcs::WithCallbackMethod_GetServerInfo<
+    Rpcs::WithCallbackMethod_FindMissingParticles<Rpcs::WithCallbackMethod_QueryUpload<
+        Rpcs::WithCallbackMethod_UploadParticles<Rpcs::WithRawCallbackMethod_RenderFrame<
+            Rpcs::WithRawCallbackMethod_RenderSequence<Rpcs::Service>>>>>>;
 
 }  // namespace
 
-class RenderService::Calls final : public v1::RenderService::CallbackService {
+class RenderService::Calls final : public CallbackService {
  public:
   explicit Calls(const Backend& backend) : backend_(backend) {}
 
@@ -200,12 +225,12 @@ class RenderService::Calls final : public v1::RenderService::CallbackService {
     return new UploadCall(backend_, count_, *context, *response);
   }
 
-  grpc::ServerWriteReactor<v1::RenderFrameResponse>* RenderFrame(
-      CallbackServerContext* context, const v1::RenderFrameRequest* request) override {
+  grpc::ServerWriteReactor<grpc::ByteBuffer>* RenderFrame(
+      CallbackServerContext* context, const grpc::ByteBuffer* request) override {
     return new RenderFrameCall(backend_, count_, *context, *request);
   }
 
-  grpc::ServerBidiReactor<v1::RenderSequenceRequest, v1::RenderSequenceResponse>* RenderSequence(
+  grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer>* RenderSequence(
       CallbackServerContext* context) override {
     return new RenderSequenceCall(backend_, count_, *context);
   }

@@ -28,7 +28,14 @@ void RenderSequenceHandler::Accept(const v1::RenderSequenceRequest& request) {
   if (stop_.stop_requested()) {
     return;  // whoever did has ended the call
   }
-  auto job = state_.Next(request.frame(), backend_);
+  Take(state_.Next(request.frame(), backend_), request.frame().request_id());
+}
+
+void RenderSequenceHandler::OnUnreadableRequest() {
+  Take(absl::InvalidArgumentError("the message is not a RenderSequenceRequest"), "");
+}
+
+void RenderSequenceHandler::Take(absl::StatusOr<FrameJob> job, const std::string& request_id) {
   {
     const std::lock_guard lock(mutex_);
     reading_ = false;
@@ -38,7 +45,7 @@ void RenderSequenceHandler::Accept(const v1::RenderSequenceRequest& request) {
       waiting_ = *std::move(job);
       may_submit_ = true;
     } else {
-      Refuse(*slots_.back(), request.frame().request_id(), job.status());
+      Refuse(*slots_.back(), request_id, job.status());
     }
   }
   Advance();
@@ -145,7 +152,7 @@ void RenderSequenceHandler::Advance() {
         sink_.Read();
         break;
       case Step::kWrite:
-        sink_.Write(message_);
+        sink_.Write(outgoing_);
         break;
       case Step::kFinish:
         // The last touch of the sink, and advancing_ stays: nobody steps any more.
@@ -170,8 +177,8 @@ RenderSequenceHandler::Step RenderSequenceHandler::NextStep() {
       if (!messages_.has_value()) {
         messages_.emplace(**first.result);
       }
-      message_.set_frame_index(first.index);
-      if (messages_->Next(message_)) {
+      outgoing_.message.set_frame_index(first.index);
+      if (messages_->Next(outgoing_)) {
         writing_ = true;
         return Step::kWrite;
       }

@@ -48,6 +48,36 @@ class Service : public ::testing::Test {
     return request;
   }
 
+  static constexpr const char* kMalformed = "\x0a\xff not a message";
+
+  // Sends messages as they are, and returns how the call ends.
+  grpc::Status Send(const std::string& rpc, const std::vector<std::string>& messages) {
+    grpc::GenericStub generic(channel_);
+    grpc::CompletionQueue queue;
+    grpc::ClientContext context;
+    auto call = generic.PrepareCall(&context, "/halflight.v1.RenderService/" + rpc, &queue);
+    const auto wait = [&queue] {
+      void* tag = nullptr;
+      bool ok = false;
+      queue.Next(&tag, &ok);
+    };
+    call->StartCall(nullptr);
+    wait();
+    for (const std::string& bytes : messages) {
+      const grpc::Slice slice(bytes);
+      call->Write(grpc::ByteBuffer(&slice, 1), nullptr);
+      wait();
+    }
+    if (rpc != "RenderSequence") {
+      call->WritesDone(nullptr);
+      wait();
+    }
+    grpc::Status status;
+    call->Finish(&status, nullptr);
+    wait();
+    return status;
+  }
+
   grpc::Status RenderAll(const v1::RenderFrameRequest& request) {
     grpc::ClientContext context;
     auto reader = stub_->RenderFrame(&context, request);
@@ -233,11 +263,10 @@ TEST_F(Service, UploadWithAMessageThatCannotBeReadIsNeverWellAndCommitsNothing) 
   const std::string header = testing::Header(description).SerializeAsString();
   const std::string chunk = testing::Chunk(particles.payload()).SerializeAsString();
   const std::string finish = testing::Finish(description).SerializeAsString();
-  const std::string garbage = "\x0a\xff not a message";
   for (const std::vector<std::string>& stream : std::vector<std::vector<std::string>>{
-           {header, chunk, garbage},
-           {header, chunk, garbage, finish},
-           {garbage, header, chunk, finish},
+           {header, chunk, kMalformed},
+           {header, chunk, kMalformed, finish},
+           {kMalformed, header, chunk, finish},
            {header, chunk.substr(0, chunk.size() - 1), finish},
            {header, chunk, finish.substr(0, finish.size() - 1)},
            {header, testing::Chunk(std::string(3 * kMiB, '\0')).SerializeAsString(), finish},
@@ -246,32 +275,18 @@ TEST_F(Service, UploadWithAMessageThatCannotBeReadIsNeverWellAndCommitsNothing) 
            {finish},
            {header, chunk},
            {""}}) {
-    grpc::GenericStub generic(channel_);
-    grpc::CompletionQueue queue;
-    grpc::ClientContext context;
-    auto call =
-        generic.PrepareCall(&context, "/halflight.v1.RenderService/UploadParticles", &queue);
-    const auto wait = [&queue] {
-      void* tag = nullptr;
-      bool ok = false;
-      queue.Next(&tag, &ok);
-      return ok;
-    };
-    call->StartCall(nullptr);
-    wait();
-    for (const std::string& bytes : stream) {
-      const grpc::Slice slice(bytes);
-      call->Write(grpc::ByteBuffer(&slice, 1), nullptr);
-      wait();
-    }
-    call->WritesDone(nullptr);
-    wait();
-    grpc::Status status;
-    call->Finish(&status, nullptr);
-    wait();
-    EXPECT_FALSE(status.ok());
+    EXPECT_FALSE(Send("UploadParticles", stream).ok());
     EXPECT_FALSE(store_.Touch(description.sha256()));
   }
+}
+
+TEST_F(Service, MalformedRequestsForFramesAreRefused) {
+  const grpc::Status of_frame = Send("RenderFrame", {kMalformed});
+  EXPECT_EQ(of_frame.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
+  EXPECT_EQ(of_frame.error_message(), "the message is not a RenderFrameRequest");
+  const grpc::Status of_sequence = Send("RenderSequence", {kMalformed});
+  EXPECT_EQ(of_sequence.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
+  EXPECT_EQ(of_sequence.error_message(), "frame 0: the message is not a RenderSequenceRequest");
 }
 
 TEST_F(Service, InvalidRequestNamesTheField) {
