@@ -87,7 +87,8 @@ int Run(const Options& options, const sigset_t& signals) {
   auto engine =
       StartRenderThread({.device = options.device,
                          .max_queued_frames = static_cast<int>(options.limits.max_queued_frames),
-                         .renderer = {.max_reuse_bytes = options.max_reuse_bytes},
+                         .renderer = {.max_reuse_bytes = options.max_reuse_bytes,
+                                      .frames_in_flight = options.frames_in_flight},
                          .warm_up = true});
   if (!engine.ok()) {
     return Fail(kExitCannotStart, engine.status());

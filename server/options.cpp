@@ -79,6 +79,9 @@ void AddFlags(CLI::App& app, Options& options) {
   bytes("--max-reuse-bytes", options.max_reuse_bytes,
         "Bytes of what frames leave to later ones of the same particles, in main memory and on the "
         "device together; 0 reuses nothing");
+  number("--frames-in-flight", options.frames_in_flight,
+         "Frames drawn at once, one of which is read back while the device draws the others; 0: 2 "
+         "on a GPU, 1 on a CPU rasteriser");
   number("--max-image-size", limits.max_image_size,
          "Width and height of an image, times supersampling");
   number("--max-light-buffer-size", limits.max_light_buffer_size, "Texels along a light buffer");
@@ -130,6 +133,7 @@ absl::Status Check(const Options& options) {
   checks.InRange("--drain-seconds", options.drain_seconds, {.low = 0.0, .high = 86400.0});
 
   const ServerLimits& limits = options.limits;
+  checks.InRange("--frames-in-flight", options.frames_in_flight, {.low = 0.0, .high = 16.0});
   // Larger ones overflow the renderer's 32-bit sizes.
   checks.InRange("--max-image-size", limits.max_image_size, {.low = 1.0, .high = 32768.0});
   checks.InRange("--max-light-buffer-size", limits.max_light_buffer_size,

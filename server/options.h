@@ -20,6 +20,7 @@ struct Options {
   int drain_seconds = 30;
   std::string cache_dir;                // empty: particle sets are kept in memory only
   uint64_t max_reuse_bytes = 1 * kGiB;  // as in FrameRendererOptions
+  int frames_in_flight = 0;             // as in FrameRendererOptions
 };
 
 // None when only --help or --version was asked for, and printed. InvalidArgument "<flag>: <value>,

@@ -60,7 +60,6 @@ HALFLIGHT_CONSTANT(kSortedKeysBinding, 3);    // uint[N]
 HALFLIGHT_CONSTANT(kSortedValuesBinding, 4);  // uint[N]
 // Those of a list of sprites, beside the particles' own.
 HALFLIGHT_CONSTANT(kSpriteKeysBinding, 4);   // uint[N]
-HALFLIGHT_CONSTANT(kAnyNearBinding, 5);      // uint
 HALFLIGHT_CONSTANT(kSpriteOrderBinding, 0);  // uint[N]
 HALFLIGHT_CONSTANT(kSpritesBinding, 4);      // vec4[N]
 HALFLIGHT_CONSTANT(kSpriteRectsBinding, 5);  // uvec2[N]
@@ -213,8 +212,8 @@ struct CompositeBlock {
 
 // A run of the light's order.
 struct PlaceRunBlock {
-  uvec4 run;  // places [x, y); z: texels along each side of the light buffer; w: of its patches,
-              // where the first begins among all, modulo 2^32
+  uvec4 run;  // places [x, y); z: texels along each side of the light buffer, or of a square that
+              // is counted; w: of its patches, where the first begins among all, modulo 2^32
 };
 
 // Of the monomials over the disc: sweep/polynomial.h.
@@ -260,6 +259,7 @@ struct ShadeBlock {
 struct TileCompositeBlock {
   uvec4 walk;   // entries of each tile's list: x: the first, y: how many; z: first shaded place
   uvec4 slots;  // x: the first that is shown, y: of each particle
+  uvec4 tiles;  // xy: the one that the target begins with; z: across the image
   vec4 colors[kMaxLightsInTiles];  // by slot: rgb; w: least exponent
 };
 

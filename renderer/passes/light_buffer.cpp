@@ -135,21 +135,4 @@ absl::Status BlurLightBuffer(Gpu& gpu, LightBuffer& buffer, LightBuffer& scratch
   return BlurAlongAxis(gpu, buffer, scratch, {0, 1}, variance.y, density, channels);
 }
 
-Image ReadLightBuffer(const LightBuffer& buffer, bool colored) {
-  Image image;
-  image.width = buffer.texture.width();
-  image.height = buffer.texture.height();
-  if (colored) {
-    image.channels = {"R", "G", "B"};
-  } else {
-    image.channels = {"Y"};
-  }
-  image.pixels.resize(static_cast<size_t>(image.width) * static_cast<size_t>(image.height) *
-                      image.channels.size());
-  glPixelStorei(GL_PACK_ALIGNMENT, 1);
-  glGetTextureImage(buffer.texture.name(), 0, colored ? GL_RGB : GL_RED, GL_FLOAT,
-                    static_cast<GLsizei>(image.pixels.size() * sizeof(float)), image.pixels.data());
-  return image;
-}
-
 }  // namespace halflight

@@ -5,7 +5,6 @@
 
 #include "absl/status/status.h"
 #include "renderer/gpu.h"
-#include "renderer/image.h"
 #include "renderer/passes/project.h"
 #include "renderer/scene.h"
 
@@ -45,8 +44,5 @@ struct BlurVariance {
 absl::Status BlurLightBuffer(Gpu& gpu, LightBuffer& buffer, LightBuffer& scratch,
                              const BlurVariance& variance, const glm::vec3& density,
                              const LightChannels& channels);
-
-// The optical depth as it stands; one or three channels. Waits for the device.
-Image ReadLightBuffer(const LightBuffer& buffer, bool colored);
 
 }  // namespace halflight

@@ -95,13 +95,11 @@ struct LightBuffers {
   }
 };
 
-void AppendLayer(Image layer, Image& layers) {
-  if (layers.pixels.empty()) {
-    layers = std::move(layer);
-    return;
-  }
-  layers.pixels.insert(layers.pixels.end(), layer.pixels.begin(), layer.pixels.end());
-  ++layers.layers;
+// Of the traversal's light buffer as it stands at times, without pixels.
+Image DescribeLightImage(const Traversal& traversal, int layers) {
+  Image image{traversal.light_buffer_size, traversal.light_buffer_size, layers, {"Y"}, {}};
+  if (traversal.colored_light_buffer) image.channels = {"R", "G", "B"};
+  return image;
 }
 
 }  // namespace
@@ -167,8 +165,8 @@ std::vector<PlannedPass> DescribeHalfAnglePasses(const Traversal& traversal) {
   return passes;
 }
 
-absl::StatusOr<ShadowResult> DrawHalfAngleLight(const TraversalContext& context,
-                                                LightReport& report) {
+absl::Status DrawHalfAngleLight(const TraversalContext& context, LightReport& report,
+                                ShadowResult& shadow) {
   const Traversal& traversal = context.traversal;
   const Light& source = context.scene.lights[static_cast<size_t>(*traversal.shadow_light)];
   Gpu& gpu = context.gpu;
@@ -217,8 +215,9 @@ absl::StatusOr<ShadowResult> DrawHalfAngleLight(const TraversalContext& context,
                            spread->InTexels(from, to, texels_per_unit), source.shadow_density,
                            ChannelsOf(traversal));
   };
-  ShadowResult result;
-  for (size_t s = 0; s + 1 < order.slice_begin.size(); ++s) {
+  const size_t slices = order.slice_begin.size() - 1;
+  shadow.light_layers = DescribeLightImage(traversal, static_cast<int>(slices));
+  for (size_t s = 0; s < slices; ++s) {
     if (context.stop.stop_requested()) return absl::CancelledError("frame cancelled");
     const uint32_t begin = order.slice_begin[s];
     const uint32_t end = order.slice_begin[s + 1];
@@ -250,8 +249,8 @@ absl::StatusOr<ShadowResult> DrawHalfAngleLight(const TraversalContext& context,
     }
     if (!status.ok()) return status;
     if (traversal.keep_layers) {
-      AppendLayer(ReadLightBuffer(buffers.before, traversal.colored_light_buffer),
-                  result.light_layers);
+      context.readback.Copy(buffers.before.texture,
+                            {.image = shadow.light_layers, .layer = static_cast<int>(s)});
     }
   }
   if (traversal.keep_light_buffer) {
@@ -262,9 +261,10 @@ absl::StatusOr<ShadowResult> DrawHalfAngleLight(const TraversalContext& context,
         return status;
       }
     }
-    result.light_buffer = ReadLightBuffer(buffers.before, traversal.colored_light_buffer);
+    shadow.light_buffer = DescribeLightImage(traversal, 1);
+    context.readback.Copy(buffers.before.texture, {shadow.light_buffer});
   }
-  return result;
+  return absl::OkStatus();
 }
 
 }  // namespace halflight

@@ -24,11 +24,6 @@ namespace {
 
 constexpr char kName[] = "LIGHT_SWEEP";
 
-bool DrawsOnDevice(const DrawContext& context) {
-  const SweepOn where = context.request.sweep_on;
-  return where == SweepOn::kDevice || (where == SweepOn::kAuto && !context.device.software);
-}
-
 std::vector<PlannedPass> LightPasses(size_t light) {
   const std::string reason = absl::StrCat("light ", light, " casts shadows");
   return {{"sort along the light", reason, 1},
@@ -243,12 +238,18 @@ absl::StatusOr<DrawnFrame> DrawOnCpu(const DrawContext& context) {
 
 }  // namespace
 
+bool LightSweep::DrawsOnDevice(const FrameRequest& request, const DeviceInfo& device) const {
+  const SweepOn where = request.sweep_on;
+  return where == SweepOn::kDevice || (where == SweepOn::kAuto && !device.software);
+}
+
 absl::StatusOr<DrawnFrame> LightSweep::Draw(const DrawContext& context) const {
-  if (!DrawsOnDevice(context)) return DrawOnCpu(context);
+  if (!DrawsOnDevice(context.request, context.device)) return DrawOnCpu(context);
   absl::StatusOr<DrawnFrame> frame = sweep::DrawOnDevice(context);
   // What the device cannot hold the CPU can, unless the device was asked for.
   const bool too_large = absl::IsResourceExhausted(frame.status());
-  return too_large && context.request.sweep_on == SweepOn::kAuto ? DrawOnCpu(context) : frame;
+  if (too_large && context.request.sweep_on == SweepOn::kAuto) return DrawOnCpu(context);
+  return frame;
 }
 
 }  // namespace halflight

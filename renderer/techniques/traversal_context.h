@@ -11,6 +11,7 @@
 #include "renderer/particle_view.h"
 #include "renderer/passes/composite.h"
 #include "renderer/passes/project.h"
+#include "renderer/readback.h"
 #include "renderer/stage_clock.h"
 
 namespace halflight {
@@ -25,6 +26,7 @@ struct TraversalContext {
   const TargetProjection& eye;
   std::span<const CompositeTarget> targets;  // one for each band of the image
   std::vector<PlannedPass>& reused;          // as in DrawnFrame
+  Readback& readback;
   StageClock& clock;
   std::stop_token stop;
 };

@@ -52,11 +52,12 @@ struct BandCase {
 
 class BandsOf : public Bands, public testing::WithParamInterface<BandCase> {};
 
-TEST_P(BandsOf, ShowWhatIsDrawnAtOnce) {
-  FrameRequest request = Request();
-  GetParam().change(request.scene);
-  const FrameResult whole = Render(request);
-  absl::StatusOr<FrameResult> bands = SmallRenderer().Render(request, {});
+void ExpectSameInBands(const FrameRequest& request, FrameRenderer& at_once,
+                       FrameRenderer& in_bands) {
+  const absl::StatusOr<FrameResult> drawn = at_once.Render(request, {});
+  ASSERT_TRUE(drawn.ok()) << drawn.status();
+  const FrameResult& whole = *drawn;
+  const absl::StatusOr<FrameResult> bands = in_bands.Render(request, {});
   ASSERT_TRUE(bands.ok()) << bands.status();
   ASSERT_EQ(bands->images.size(), whole.images.size());
   for (size_t i = 0; i < whole.images.size(); ++i) {
@@ -64,6 +65,27 @@ TEST_P(BandsOf, ShowWhatIsDrawnAtOnce) {
     EXPECT_TRUE(bands->images[i].pixels == whole.images[i].pixels)
         << "output " << i << ", off by " << test::MaxDifference(bands->images[i], whole.images[i]);
   }
+}
+
+TEST_P(BandsOf, ShowWhatIsDrawnAtOnce) {
+  FrameRequest request = Request();
+  GetParam().change(request.scene);
+  ExpectSameInBands(request, Renderer(), SmallRenderer());
+}
+
+// With tiles that reach over the borders between bands.
+TEST_P(BandsOf, ShowWhatTheSweepDrawsAtOnceOnTheDevice) {
+  FrameRequest request = Request();
+  GetParam().change(request.scene);
+  request.scene.shadow.technique = ShadowTechniqueKind::kLightSweep;
+  request.scene.shadow.fit_degree = 1;
+  request.sweep_on = SweepOn::kDevice;
+  request.images = {{ImageKind::kBeauty},
+                    {ImageKind::kDepth},
+                    {ImageKind::kLightTransmittance, 1},
+                    {ImageKind::kLightBuffer, 1, LightQuantity::kOpticalDepth}};
+  if (!request.scene.lights[1].casts_shadows()) request.images.resize(2);
+  ExpectSameInBands(request, Renderer(), SmallRenderer());
 }
 
 INSTANTIATE_TEST_SUITE_P(

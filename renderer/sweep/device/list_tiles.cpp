@@ -62,7 +62,7 @@ void BindRects(const DeviceSprites& sprites, const PlaceRun& run, shader::TilesB
 
 absl::StatusOr<DeviceTiles> ListDeviceTiles(Gpu& gpu, const DeviceSprites& sprites,
                                             const PlaceRun& run, const glm::ivec2& target_size,
-                                            int tile_size) {
+                                            int tile_size, std::optional<size_t> entry_count) {
   const gl::DebugScope scope("list tiles");
   const size_t places = run.end - run.first;
   DeviceTiles lists;
@@ -90,9 +90,9 @@ absl::StatusOr<DeviceTiles> ListDeviceTiles(Gpu& gpu, const DeviceSprites& sprit
   gl::BindStorage(shader::kEntryBeginsBinding, begins);
   if (absl::Status status = Run(gpu, CountsProgram(), block, places); !status.ok()) return status;
 
-  // Sum, and wait for the total: what it sizes is then no larger than it must be.
+  // Sum; the total sizes what follows.
   if (absl::Status status = PrefixSum(gpu, begins, places, begins); !status.ok()) return status;
-  lists.entry_count = gl::ReadWord(begins, places);
+  lists.entry_count = entry_count ? *entry_count : gl::ReadWord(begins, places);
   const size_t bytes = lists.entry_count * sizeof(uint32_t);
   if (absl::Status status = gl::CheckStorageBlock("tile entries of a run of particles", bytes);
       !status.ok()) {
