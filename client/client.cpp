@@ -153,7 +153,25 @@ absl::StatusOr<std::vector<std::string>> Client::Impl::FindMissing(
                                   response.missing_sha256().end());
 }
 
-absl::Status Client::Impl::UploadOnce(grpc::ClientContext& context,
+absl::StatusOr<v1::QueryUploadResponse> Client::Impl::QueryUpload(
+    const grpc::ClientContext& context, const std::string& sha256, std::string_view route,
+    const std::stop_token& stop) {
+  grpc::ClientContext query;
+  query.set_deadline(context.deadline());
+  SetRoute(query, route);
+  const std::stop_callback cancel(stop, [&query] { query.TryCancel(); });
+  v1::QueryUploadRequest request;
+  request.set_sha256(sha256);
+  v1::QueryUploadResponse response;
+  absl::Status status = FromGrpc(stub_->QueryUpload(&query, request, &response));
+  // A server from before uploads could be resumed tells after the header that it has the set.
+  if (!status.ok() && status.code() != absl::StatusCode::kUnimplemented) {
+    return status;
+  }
+  return response;
+}
+
+absl::Status Client::Impl::UploadFrom(uint64_t offset, grpc::ClientContext& context,
                                       const EncodedParticles& particles) {
   v1::UploadParticlesResponse response;
   const auto writer = stub_->UploadParticles(&context, &response);
@@ -162,12 +180,14 @@ absl::Status Client::Impl::UploadOnce(grpc::ClientContext& context,
   *header.mutable_layout() = particles.layout;
   header.set_byte_size(particles.payload.size());
   header.set_sha256(particles.sha256);
+  header.set_resume_offset(offset);
   bool open = writer->Write(message);
   // A write that fails means that the server has answered already, be it that it has the set.
-  for (size_t at = 0; open && at < particles.payload.size(); at += kUploadChunkBytes) {
-    message.set_chunk(particles.payload.data() + at,
-                      std::min(kUploadChunkBytes, particles.payload.size() - at));
+  for (size_t at = offset; open && at < particles.payload.size(); at += kUploadChunkBytes) {
+    const size_t bytes = std::min(kUploadChunkBytes, particles.payload.size() - at);
+    message.set_chunk(particles.payload.data() + at, bytes);
     open = writer->Write(message);
+    sent_bytes_ += open ? bytes : 0;
   }
   if (open) {
     message.mutable_finish()->set_byte_size(particles.payload.size());
@@ -179,19 +199,27 @@ absl::Status Client::Impl::UploadOnce(grpc::ClientContext& context,
   return FromGrpc(writer->Finish());
 }
 
-absl::Status Client::Impl::Upload(const EncodedParticles& particles, std::string_view route,
-                                  const std::stop_token& stop) {
-  return Try(route, stop,
-             [&](grpc::ClientContext& context) { return UploadOnce(context, particles); });
-}
-
 absl::Status Client::Impl::EnsureUploaded(const EncodedParticles& particles, std::string_view route,
                                           const std::stop_token& stop) {
-  const auto missing = FindMissing({particles.sha256}, route, stop);
-  if (!missing.ok() || missing->empty()) {
-    return missing.status();
-  }
-  return Upload(particles, route, stop);
+  bool from_start = false;
+  return Try(route, stop, [&](grpc::ClientContext& context) -> absl::Status {
+    const auto there = QueryUpload(context, particles.sha256, route, stop);
+    if (!there.ok() || there->complete()) {
+      return there.status();
+    }
+    const uint64_t offset =
+        from_start ? 0 : std::min<uint64_t>(there->committed_bytes(), particles.payload.size());
+    absl::Status status = UploadFrom(offset, context, particles);
+    if (status.ok()) {
+      saved_bytes_ += offset;
+    } else if (offset > 0 && status.code() == absl::StatusCode::kDataLoss) {
+      from_start = true;  // somebody else sent other bytes under this name
+      return absl::UnavailableError(MessageOf(status));
+    } else if (offset > 0 && status.code() == absl::StatusCode::kOutOfRange) {
+      return absl::UnavailableError(MessageOf(status));  // gone since it was asked about
+    }
+    return status;
+  });
 }
 
 absl::StatusOr<RenderedFrame> Client::Impl::RenderOnce(grpc::ClientContext& context,
@@ -276,13 +304,11 @@ absl::StatusOr<std::vector<std::string>> Client::FindMissing(
   return impl_->FindMissing(sha256, "", impl_->options().stop);
 }
 
-absl::Status Client::Upload(const EncodedParticles& particles) {
-  return impl_->Upload(particles, particles.sha256, impl_->options().stop);
-}
-
 absl::Status Client::EnsureUploaded(const EncodedParticles& particles) {
   return impl_->EnsureUploaded(particles, particles.sha256, impl_->options().stop);
 }
+
+UploadTotals Client::upload_totals() const { return impl_->upload_totals(); }
 
 absl::StatusOr<RenderedFrame> Client::RenderFrame(v1::RenderFrameRequest request,
                                                   const EncodedParticles* particles) {

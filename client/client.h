@@ -32,6 +32,12 @@ struct ClientOptions {
   std::stop_token stop;
 };
 
+// What uploads cost so far, payload bytes.
+struct UploadTotals {
+  uint64_t sent_bytes = 0;   // given to the connection, also of uploads that broke off
+  uint64_t saved_bytes = 0;  // not sent because the server had them of an upload that broke off
+};
+
 // One frame of a sequence, before it is sent.
 struct SequenceFrame {
   v1::RenderFrameRequest request;
@@ -67,12 +73,13 @@ class Client {
   // Those of the named sets that the server lacks.
   absl::StatusOr<std::vector<std::string>> FindMissing(const std::vector<std::string>& sha256);
 
-  // Sends a set, whether or not the server has it.
-  absl::Status Upload(const EncodedParticles& particles);
-
-  // Sends a set where the server lacks it. InvalidArgument where it is larger than the server
-  // takes.
+  // Sends a set where the server lacks it, and of it what the server lacks: each try goes on where
+  // an earlier one broke off, be it one of another process. InvalidArgument where it is larger than
+  // the server takes.
   absl::Status EnsureUploaded(const EncodedParticles& particles);
+
+  // Of all uploads by this client, those of sequences included.
+  [[nodiscard]] UploadTotals upload_totals() const;
 
   // Renders one frame. With `particles` they are uploaded first and named in the request; where the
   // server has dropped them in between they are sent once more.

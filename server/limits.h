@@ -32,6 +32,9 @@ struct ServerLimits {
   // Samples times particles: about a minute on two cores where particles overlap a few hundred
   // deep.
   uint64_t max_reference_work = 400'000'000'000;
+  uint32_t max_partial_uploads = 64;
+  uint32_t partial_upload_seconds = 600;
+  uint64_t max_cache_dir_bytes = 16 * kGiB;  // 0: there is no cache directory
 };
 
 inline constexpr uint32_t kMinLightBufferSize = 16;

@@ -6,6 +6,7 @@
 #include <iostream>
 #include <memory>
 #include <optional>
+#include <utility>
 
 #include <spdlog/sinks/stdout_sinks.h>
 #include <spdlog/spdlog.h>
@@ -15,6 +16,8 @@
 #include "renderer/render_thread.h"
 #include "server/grpc_server.h"
 #include "server/options.h"
+#include "server/particle_files.h"
+#include "server/status_text.h"
 #include "server/version.h"
 
 namespace {
@@ -40,14 +43,17 @@ sigset_t BlockTerminationSignals() {
   return signals;
 }
 
-// The signal that ends the service. Meanwhile gives memory back whenever calls have stopped coming.
-int WaitForSignal(const GrpcServer& server, const sigset_t& signals) {
+// The signal that ends the service. Meanwhile gives memory back: of uploads that nobody resumes,
+// and whenever calls have stopped coming.
+int WaitForSignal(const GrpcServer& server, PartialUploads& partial_uploads,
+                  const sigset_t& signals) {
   uint64_t seen = 0;
   std::optional<uint64_t> given_back;
   while (true) {
     if (const int signal = sigtimedwait(&signals, nullptr, &kIdlePoll); signal > 0) {
       return signal;
     }
+    partial_uploads.DropExpired();
     const uint64_t begun = server.calls_begun();
     if (server.idle() && begun == seen && begun != given_back) {
       BlockCache::Release();
@@ -58,11 +64,12 @@ int WaitForSignal(const GrpcServer& server, const sigset_t& signals) {
   }
 }
 
-// True when nothing is under way any more, false when a second signal or the time came first.
-bool Drain(GrpcServer& server, const sigset_t& signals, int seconds) {
+// True when nothing is under way any more, and nothing waits to be written to disk; false when a
+// second signal or the time came first.
+bool Drain(GrpcServer& server, const ParticleStore& store, const sigset_t& signals, int seconds) {
   const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(seconds);
   server.BeginDrain();
-  while (!server.idle()) {
+  while (!server.idle() || !store.idle()) {
     if (sigtimedwait(&signals, nullptr, &kDrainPoll) > 0 ||
         std::chrono::steady_clock::now() >= until) {
       return false;
@@ -106,11 +113,22 @@ int Run(const Options& options, const sigset_t& signals) {
   // Each uses those above it, and is gone before them.
   const ServerLimits limits = LimitsOnDevice(options.limits, device);
   const std::string version = kVersion;
-  ParticleStore store(limits.max_cache_bytes);
+  std::unique_ptr<ParticleFiles> files;
+  if (!options.cache_dir.empty()) {
+    auto opened = ParticleFiles::Open(options.cache_dir, limits);
+    if (!opened.ok()) {
+      return Fail(kExitCannotStart, Prefixed("--cache-dir ", opened.status()));
+    }
+    files = *std::move(opened);
+  }
+  ParticleStore store(limits.max_cache_bytes, std::move(files));
   ByteBudget upload_memory(limits.max_cache_bytes);
+  PartialUploads partial_uploads(upload_memory,
+                                 {.max_count = limits.max_partial_uploads,
+                                  .max_age = std::chrono::seconds(limits.partial_upload_seconds)});
   FramePipeline pipeline(**engine, PipelineOptionsOf(options, limits));
   auto server = GrpcServer::Start(options.addresses,
-                                  {device, limits, version, store, upload_memory, pipeline});
+                                  {device, limits, version, store, partial_uploads, pipeline});
   if (!server.ok()) {
     return Fail(kExitCannotStart, server.status());
   }
@@ -118,9 +136,9 @@ int Run(const Options& options, const sigset_t& signals) {
     spdlog::info("listening address={}", address);
   }
 
-  const int signal = WaitForSignal(**server, signals);
+  const int signal = WaitForSignal(**server, partial_uploads, signals);
   spdlog::info("draining signal={} drain_seconds={}", signal, options.drain_seconds);
-  if (!Drain(**server, signals, options.drain_seconds)) {
+  if (!Drain(**server, store, signals, options.drain_seconds)) {
     // At once: what runs may be stuck, so nothing is waited for.
     (*server)->RemoveSocketFiles();
     spdlog::error("stopped before the calls under way were finished");
@@ -141,6 +159,8 @@ int main(int argc, char** argv) {
     return EXIT_SUCCESS;
   }
   KeepFreedMemory();
+  // A file that may not grow is an error of the write, not the end of the server.
+  signal(SIGXFSZ, SIG_IGN);
   // Before any thread is made: all of them inherit the mask.
   const sigset_t signals = BlockTerminationSignals();
   spdlog::set_default_logger(spdlog::stderr_logger_mt("halflightd"));

@@ -43,6 +43,12 @@ void AddFlags(CLI::App& app, Options& options) {
                  "How long what runs may go on after SIGTERM")
       ->capture_default_str();
 
+  CLI::Option* const cache_dir =
+      app.add_option("--cache-dir", options.cache_dir,
+                     "Directory in which particle sets outlast the server; made where it is "
+                     "missing. Unset: they are kept in memory only")
+          ->type_name("DIRECTORY");
+
   ServerLimits& limits = options.limits;
   const auto number = [&app](const std::string& flag, auto& value, const std::string& help) {
     app.add_option(flag, value, help)->capture_default_str()->group("Limits");
@@ -54,7 +60,7 @@ void AddFlags(CLI::App& app, Options& options) {
       },
       "");
   const auto bytes = [&](const std::string& flag, uint64_t& value, const std::string& help) {
-    app.add_option(flag, value, help + "; takes suffixes such as 64MiB")
+    return app.add_option(flag, value, help + "; takes suffixes such as 64MiB")
         ->capture_default_str()
         ->transform(CLI::AsSizeValue(false))
         ->transform(not_negative)  // the last one added looks first
@@ -63,7 +69,13 @@ void AddFlags(CLI::App& app, Options& options) {
   number("--max-particles", limits.max_particles, "Particles of one set");
   bytes("--max-particle-bytes", limits.max_particle_bytes, "Bytes of one particle set");
   bytes("--max-cache-bytes", limits.max_cache_bytes,
-        "Bytes of all particle sets kept, and of all uploads in progress");
+        "Bytes of all particle sets kept in memory, and of all uploads in progress or broken off");
+  bytes("--max-cache-dir-bytes", limits.max_cache_dir_bytes, "Bytes of all particle sets on disk")
+      ->needs(cache_dir);
+  number("--max-partial-uploads", limits.max_partial_uploads,
+         "Uploads that broke off and are kept to be resumed");
+  number("--partial-upload-seconds", limits.partial_upload_seconds,
+         "How long each of them is kept; 0: none is");
   bytes("--max-reuse-bytes", options.max_reuse_bytes,
         "Bytes of what frames leave to later ones of the same particles, in main memory and on the "
         "device together; 0 reuses nothing");
@@ -158,6 +170,14 @@ absl::Status Check(const Options& options) {
     checks.Reject("--max-cache-bytes", fmt::format("{}", limits.max_cache_bytes),
                   fmt::format("at least --max-particle-bytes, {}", limits.max_particle_bytes));
   }
+  checks.InRange("--max-partial-uploads", limits.max_partial_uploads,
+                 {.low = 0.0, .high = 65536.0});
+  checks.InRange("--partial-upload-seconds", limits.partial_upload_seconds,
+                 {.low = 0.0, .high = 86400.0 * 365.0});
+  if (!options.cache_dir.empty() && limits.max_cache_dir_bytes < limits.max_particle_bytes) {
+    checks.Reject("--max-cache-dir-bytes", fmt::format("{}", limits.max_cache_dir_bytes),
+                  fmt::format("at least --max-particle-bytes, {}", limits.max_particle_bytes));
+  }
   return checks.status();
 }
 
@@ -183,6 +203,9 @@ absl::StatusOr<std::optional<Options>> ParseOptions(int argc, const char* const*
   if (options.encode_threads == 0) {
     const auto cores = static_cast<int>(std::thread::hardware_concurrency());
     options.encode_threads = std::max(1, cores - 1);
+  }
+  if (options.cache_dir.empty()) {
+    options.limits.max_cache_dir_bytes = 0;
   }
   return options;
 }

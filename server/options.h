@@ -18,6 +18,7 @@ struct Options {
   std::string log_level = "info";
   int encode_threads = 0;  // filled in: one for each core, less the one that renders
   int drain_seconds = 30;
+  std::string cache_dir;                // empty: particle sets are kept in memory only
   uint64_t max_reuse_bytes = 1 * kGiB;  // as in FrameRendererOptions
   int frames_in_flight = 0;             // as in FrameRendererOptions
 };

@@ -13,6 +13,7 @@
 #include "server/error_detail.h"
 #include "server/handlers/find_missing_particles.h"
 #include "server/handlers/get_server_info.h"
+#include "server/handlers/query_upload.h"
 #include "server/handlers/render_frame.h"
 #include "server/handlers/render_sequence.h"
 #include "server/handlers/upload_particles.h"
@@ -234,10 +235,10 @@ class RenderSequenceCall final : public grpc::ServerBidiReactor<grpc::ByteBuffer
 };
 
 using Rpcs = v1::RenderService;
-using CallbackService =
-    Rpcs::WithCallbackMethod_GetServerInfo<Rpcs::WithCallbackMethod_FindMissingParticles<
+using CallbackService = Rpcs::WithCallbackMethod_GetServerInfo<
+    Rpcs::WithCallbackMethod_FindMissingParticles<Rpcs::WithCallbackMethod_QueryUpload<
         Rpcs::WithCallbackMethod_UploadParticles<Rpcs::WithRawCallbackMethod_RenderFrame<
-            Rpcs::WithRawCallbackMethod_RenderSequence<Rpcs::Service>>>>>;
+            Rpcs::WithRawCallbackMethod_RenderSequence<Rpcs::Service>>>>>>;
 
 }  // namespace
 
@@ -260,6 +261,13 @@ class RenderService::Calls final : public CallbackService {
       v1::FindMissingParticlesResponse* response) override {
     return AnswerAtOnce(*context, *response,
                         [&] { return halflight::FindMissingParticles(shared_.backend, *request); });
+  }
+
+  grpc::ServerUnaryReactor* QueryUpload(CallbackServerContext* context,
+                                        const v1::QueryUploadRequest* request,
+                                        v1::QueryUploadResponse* response) override {
+    return AnswerAtOnce(*context, *response,
+                        [&] { return halflight::QueryUpload(backend_, *request); });
   }
 
   grpc::ServerReadReactor<v1::UploadParticlesRequest>* UploadParticles(

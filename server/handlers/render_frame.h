@@ -15,8 +15,8 @@
 
 namespace halflight {
 
-// Held by the call, and by the pipeline while its frame is there: the sink has to live only until
-// it is finished.
+// Held by the call, by the store while particles are read for it, and by the pipeline while its
+// frame is there: the sink has to live only until it is finished.
 class RenderFrameHandler : public std::enable_shared_from_this<RenderFrameHandler> {
  public:
   RenderFrameHandler(const Backend& backend, ResponseSink<v1::RenderFrameResponse>& sink,
@@ -32,6 +32,8 @@ class RenderFrameHandler : public std::enable_shared_from_this<RenderFrameHandle
   void OnCancel() { stop_.request_stop(); }
 
  private:
+  // The particles are in memory, or nowhere.
+  void Begin(const v1::RenderFrameRequest& request);
   absl::Status Submit(const v1::RenderFrameRequest& request);
   void OnFrame(const absl::StatusOr<std::shared_ptr<const EncodedFrame>>& frame);
   void WriteNext();

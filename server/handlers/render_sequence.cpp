@@ -12,6 +12,20 @@
 namespace halflight {
 
 void RenderSequenceHandler::OnRequest(const v1::RenderSequenceRequest& request) {
+  const std::string& sha256 = request.frame().scene().particle_sha256();
+  if (backend_.store.OnDiskOnly(sha256)) {
+    // Until then the read counts as not done, so that no other begins.
+    backend_.store.Fetch(sha256, stop_.get_token(),
+                         [self = shared_from_this(), request] { self->Accept(request); });
+  } else {
+    Accept(request);
+  }
+}
+
+void RenderSequenceHandler::Accept(const v1::RenderSequenceRequest& request) {
+  if (stop_.stop_requested()) {
+    return;  // whoever did has ended the call
+  }
   Take(state_.Next(request.frame(), backend_), request.frame().request_id());
 }
 

@@ -25,8 +25,8 @@ namespace halflight {
 // encoder and wire busy at once, and the bound on what a slow reader makes the server hold.
 inline constexpr size_t kFramesAhead = 4;
 
-// Held by the call, and by the pipeline while frames of it are there: the sink has to live only
-// until it is finished.
+// Held by the call, by the store while particles are read for it, and by the pipeline while frames
+// of it are there: the sink has to live only until it is finished.
 //
 // Reads, writes and frames complete on different threads. Each notes what happened under the mutex
 // and calls Advance, which lets one thread at a time do what follows, without the mutex: so the
@@ -61,6 +61,8 @@ class RenderSequenceHandler : public std::enable_shared_from_this<RenderSequence
 
   enum class Step : uint8_t { kNothing, kSubmit, kRead, kWrite, kFinish };
 
+  // The particles are in memory, or nowhere.
+  void Accept(const v1::RenderSequenceRequest& request);
   void Take(absl::StatusOr<FrameJob> job, const std::string& request_id);
   void Refuse(Slot& slot, const std::string& request_id, const absl::Status& status);
   void Submit();

@@ -52,6 +52,17 @@ TEST(Options, TakeSeveralAddressesAndSizesWithSuffixes) {
   EXPECT_EQ((*options)->frames_in_flight, 3);
 }
 
+TEST(Options, CacheDirectoryHasABoundAndWithoutOneThereIsNone) {
+  EXPECT_EQ((*Parse({}))->limits.max_cache_dir_bytes, 0U);
+  const auto options = Parse({"--cache-dir", "/var/cache/halflight", "--partial-upload-seconds",
+                              "60", "--max-partial-uploads", "5"});
+  ASSERT_TRUE(options.ok() && options->has_value()) << options.status();
+  EXPECT_EQ((*options)->cache_dir, "/var/cache/halflight");
+  EXPECT_EQ((*options)->limits.max_cache_dir_bytes, 16 * kGiB);
+  EXPECT_EQ((*options)->limits.partial_upload_seconds, 60U);
+  EXPECT_EQ((*options)->limits.max_partial_uploads, 5U);
+}
+
 TEST(Options, HelpNamesEveryFlagAndRunsNothing) {
   std::ostringstream out;
   const auto options = Parse({"--help"}, &out);
@@ -76,7 +87,11 @@ TEST(Options, HelpNamesEveryFlagAndRunsNothing) {
                            "--max-outputs",
                            "--max-output-bytes",
                            "--max-queued-frames",
-                           "--max-message-bytes"}) {
+                           "--max-message-bytes",
+                           "--cache-dir",
+                           "--max-cache-dir-bytes",
+                           "--max-partial-uploads",
+                           "--partial-upload-seconds"}) {
     EXPECT_THAT(out.str(), HasSubstr(flag));
   }
 }
@@ -94,6 +109,12 @@ TEST(Options, ErrorsNameFlagValueAndWhatIsAllowed) {
   EXPECT_THAT(ErrorOf({"--max-cache-bytes", "1MiB", "--max-particle-bytes", "2MiB"}),
               HasSubstr("--max-cache-bytes: 1048576, allowed: at least --max-particle-bytes"));
   EXPECT_THAT(ErrorOf({"--max-cache-bytes", "-1"}), HasSubstr("--max-cache-bytes: -1, allowed: "));
+  EXPECT_THAT(ErrorOf({"--cache-dir", "/c", "--max-cache-dir-bytes", "1MiB"}),
+              HasSubstr("--max-cache-dir-bytes: 1048576, allowed: at least --max-particle-bytes"));
+  EXPECT_THAT(ErrorOf({"--max-cache-dir-bytes", "20GiB"}), HasSubstr("--cache-dir"));
+  EXPECT_THAT(ErrorOf({"--max-partial-uploads", "65537"}),
+              HasSubstr("--max-partial-uploads: 65537, allowed: [0, 65536]"));
+  EXPECT_THAT(ErrorOf({"--partial-upload-seconds", "-1"}), HasSubstr("--partial-upload-seconds"));
   EXPECT_THAT(ErrorOf({"--drain-seconds", "-1"}), HasSubstr("--drain-seconds"));
   EXPECT_THAT(ErrorOf({"--frames-in-flight", "17"}),
               HasSubstr("--frames-in-flight: 17, allowed: [0, 16]"));

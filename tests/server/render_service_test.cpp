@@ -18,6 +18,7 @@
 #include "server/grpc_server.h"
 #include "tests/process/wait_for.h"
 #include "tests/server/fake_engine.h"
+#include "tests/server/upload_messages.h"
 
 namespace halflight {
 namespace {
@@ -67,7 +68,7 @@ class Service : public ::testing::Test {
       call->Write(grpc::ByteBuffer(&slice, 1), nullptr);
       wait();
     }
-    if (rpc == "RenderFrame") {
+    if (rpc != "RenderSequence") {
       call->WritesDone(nullptr);
       wait();
     }
@@ -89,11 +90,12 @@ class Service : public ::testing::Test {
   FakeEngine engine_;
   ServerLimits limits_;
   std::string version_ = "1.2.3";
-  ParticleStore store_{1 << 20};
-  ByteBudget upload_memory_{1 << 20};
+  ParticleStore store_{8 << 20};
+  ByteBudget upload_memory_{8 << 20};
+  PartialUploads partial_uploads_{upload_memory_, {}};
   FramePipeline pipeline_{engine_,
                           {.max_queued_frames = 2, .encode_threads = 2, .encode = EncodePlain}};
-  Backend backend_{engine_.device(), limits_, version_, store_, upload_memory_, pipeline_};
+  Backend backend_{engine_.device(), limits_, version_, store_, partial_uploads_, pipeline_};
   std::unique_ptr<GrpcServer> server_;
   std::shared_ptr<grpc::Channel> channel_;
   std::unique_ptr<v1::RenderService::Stub> stub_;
@@ -320,23 +322,28 @@ TEST_F(Service, UploadedSetIsFoundAndRendered) {
   EXPECT_EQ(engine_.last_request().scene.particles->size(), 1000U);
 }
 
-TEST_F(Service, UploadWithAMalformedMessageCommitsNothing) {
+TEST_F(Service, UploadWithAMessageThatCannotBeReadIsNeverWellAndCommitsNothing) {
   const v1::InlineParticles particles =
-      MakeParticles(10, {v1::PARTICLE_ATTRIBUTE_POSITION, v1::PARTICLE_ATTRIBUTE_RADIUS});
-  Sha256 digest = BeginParticleDigest(particles.layout());
-  digest.Update(particles.payload());
-  const std::string sha256 = digest.Finish();
-  v1::UploadParticlesRequest header;
-  *header.mutable_header()->mutable_layout() = particles.layout();
-  header.mutable_header()->set_byte_size(particles.payload().size());
-  header.mutable_header()->set_sha256(sha256);
-  v1::UploadParticlesRequest chunk;
-  chunk.set_chunk(particles.payload());
-
-  EXPECT_FALSE(
-      Send("UploadParticles", {header.SerializeAsString(), chunk.SerializeAsString(), kMalformed})
-          .ok());
-  EXPECT_FALSE(store_.Touch(sha256));
+      MakeParticles(100000, {v1::PARTICLE_ATTRIBUTE_POSITION, v1::PARTICLE_ATTRIBUTE_RADIUS});
+  const v1::ParticleSetDescription description = testing::Describe(particles);
+  const std::string header = testing::Header(description).SerializeAsString();
+  const std::string chunk = testing::Chunk(particles.payload()).SerializeAsString();
+  const std::string finish = testing::Finish(description).SerializeAsString();
+  for (const std::vector<std::string>& stream : std::vector<std::vector<std::string>>{
+           {header, chunk, kMalformed},
+           {header, chunk, kMalformed, finish},
+           {kMalformed, header, chunk, finish},
+           {header, chunk.substr(0, chunk.size() - 1), finish},
+           {header, chunk, finish.substr(0, finish.size() - 1)},
+           {header, testing::Chunk(std::string(3 * kMiB, '\0')).SerializeAsString(), finish},
+           {header, finish, chunk},
+           {chunk, header, finish},
+           {finish},
+           {header, chunk},
+           {""}}) {
+    EXPECT_FALSE(Send("UploadParticles", stream).ok());
+    EXPECT_FALSE(store_.Touch(description.sha256()));
+  }
 }
 
 TEST_F(Service, MalformedRequestsForFramesAreRefused) {
