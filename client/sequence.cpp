@@ -82,10 +82,10 @@ class SequenceStream {
   using SendFrame = std::function<absl::Status(uint64_t index, Stream& stream,
                                                const std::stop_token&, bool& open)>;
 
-  SequenceStream(v1::RenderService::Stub& stub, std::string_view route, uint64_t first,
-                 uint64_t count)
+  SequenceStream(v1::RenderService::Stub& stub, std::string_view route, const std::string& token,
+                 uint64_t first, uint64_t count)
       : first_(first), count_(count), next_(first), progress_(first) {
-    SetRoute(context_, route);
+    SetMetadata(context_, route, token);
     stream_ = stub.RenderSequence(&context_);
   }
 
@@ -247,7 +247,7 @@ absl::Status Client::Impl::RenderSequence(uint64_t count, const FrameSource& sou
   int tries = 1;
   Backoff backoff(options_.first_backoff);
   while (next < count) {
-    SequenceStream stream(*stub_, route, next, count);
+    SequenceStream stream(*stub_, route, options_.security.token, next, count);
     const auto [status, from_server] =
         stream.Run(send, sink, read_ahead, options_.timeout, options_.stop);
     if (options_.stop.stop_requested()) {

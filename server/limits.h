@@ -27,6 +27,10 @@ struct ServerLimits {
   // Samples times particles: about a minute on two cores where particles overlap a few hundred
   // deep.
   uint64_t max_reference_work = 400'000'000'000;
+  uint32_t max_connections = 4096;
+  uint32_t max_connection_streams = 100;
+  uint32_t max_handshake_seconds = 10;
+  uint32_t max_idle_seconds = 3600;
 };
 
 inline constexpr uint32_t kMinLightBufferSize = 16;

@@ -30,37 +30,55 @@ struct CallCount {
   std::atomic<bool> draining = false;
 };
 
-// One call under way. Counted before draining is looked at, so that whoever drains and then sees no
-// calls can be sure that none slips in.
-class CallToken {
+// One call under way, and whose it is. Counted before draining is looked at, so that whoever drains
+// and then sees no calls can be sure that none slips in.
+class CallEntry {
  public:
-  explicit CallToken(CallCount& count) : count_(count) {
-    ++count_.active;
-    ++count_.begun;
-  }
-  ~CallToken() { --count_.active; }
-  CallToken(const CallToken&) = delete;
-  CallToken& operator=(const CallToken&) = delete;
-  CallToken(CallToken&&) = delete;
-  CallToken& operator=(CallToken&&) = delete;
+  CallEntry(CallCount& count, const Access& access, const CallbackServerContext& context)
+      : count_(count), caller_(Enter(count, access, context)) {}
+  ~CallEntry() { --count_.active; }
+  CallEntry(const CallEntry&) = delete;
+  CallEntry& operator=(const CallEntry&) = delete;
+  CallEntry(CallEntry&&) = delete;
+  CallEntry& operator=(CallEntry&&) = delete;
 
-  [[nodiscard]] bool refused() const { return count_.draining; }
+  // OK, or what the call has to end with.
+  [[nodiscard]] const absl::Status& admission() const { return caller_.status(); }
+  // Nobody where it is not admitted.
+  [[nodiscard]] Caller caller() const { return caller_.ok() ? *caller_ : Caller(); }
 
  private:
+  static absl::StatusOr<Caller> Enter(CallCount& count, const Access& access,
+                                      const CallbackServerContext& context) {
+    ++count.active;
+    ++count.begun;
+    if (count.draining) {
+      return absl::UnavailableError("the server is shutting down: retry elsewhere or later");
+    }
+    return access.Identify(context);
+  }
+
   CallCount& count_;
+  const absl::StatusOr<Caller> caller_;
 };
 
-absl::Status DrainingError() {
-  return absl::UnavailableError("the server is shutting down: retry elsewhere or later");
-}
+// What the calls of the service share. References: the service has them.
+struct Shared {
+  const Backend& backend;
+  const Access& access;
+  CallCount& count;
+};
 
 class UploadCall final : public grpc::ServerReadReactor<v1::UploadParticlesRequest> {
  public:
-  UploadCall(const Backend& backend, CallCount& count, CallbackServerContext& context,
+  UploadCall(const Shared& shared, CallbackServerContext& context,
              v1::UploadParticlesResponse& response)
-      : token_(count), context_(context), response_(response), handler_(backend) {
-    if (token_.refused()) {
-      Answer(DrainingError());
+      : entry_(shared.count, shared.access, context),
+        context_(context),
+        response_(response),
+        handler_(shared.backend) {
+    if (!entry_.admission().ok()) {
+      Answer(entry_.admission());
     } else {
       StartRead(&request_);
     }
@@ -88,7 +106,7 @@ class UploadCall final : public grpc::ServerReadReactor<v1::UploadParticlesReque
     Finish(ToGrpc(answer.status(), context_));
   }
 
-  const CallToken token_;
+  const CallEntry entry_;
   CallbackServerContext& context_;
   v1::UploadParticlesResponse& response_;
   UploadParticlesHandler handler_;
@@ -100,13 +118,13 @@ class RenderFrameCall final : public grpc::ServerWriteReactor<v1::RenderFrameRes
   using Reactor = grpc::ServerWriteReactor<v1::RenderFrameResponse>;
 
  public:
-  RenderFrameCall(const Backend& backend, CallCount& count, CallbackServerContext& context,
+  RenderFrameCall(const Shared& shared, CallbackServerContext& context,
                   const v1::RenderFrameRequest& request)
-      : token_(count),
+      : entry_(shared.count, shared.access, context),
         context_(context),
-        handler_(std::make_shared<RenderFrameHandler>(backend, *this)) {
-    if (token_.refused()) {
-      RenderFrameCall::Finish(DrainingError());
+        handler_(std::make_shared<RenderFrameHandler>(shared.backend, *this, entry_.caller())) {
+    if (!entry_.admission().ok()) {
+      RenderFrameCall::Finish(entry_.admission());
     } else {
       handler_->Start(request);
     }
@@ -120,7 +138,7 @@ class RenderFrameCall final : public grpc::ServerWriteReactor<v1::RenderFrameRes
   void Write(const v1::RenderFrameResponse& message) override { StartWrite(&message); }
   void Finish(const absl::Status& status) override { Reactor::Finish(ToGrpc(status, context_)); }
 
-  const CallToken token_;
+  const CallEntry entry_;
   CallbackServerContext& context_;
   const std::shared_ptr<RenderFrameHandler> handler_;
 };
@@ -131,12 +149,12 @@ class RenderSequenceCall final
   using Reactor = grpc::ServerBidiReactor<v1::RenderSequenceRequest, v1::RenderSequenceResponse>;
 
  public:
-  RenderSequenceCall(const Backend& backend, CallCount& count, CallbackServerContext& context)
-      : token_(count),
+  RenderSequenceCall(const Shared& shared, CallbackServerContext& context)
+      : entry_(shared.count, shared.access, context),
         context_(context),
-        handler_(std::make_shared<RenderSequenceHandler>(backend, *this)) {
-    if (token_.refused()) {
-      RenderSequenceCall::Finish(DrainingError());
+        handler_(std::make_shared<RenderSequenceHandler>(shared.backend, *this, entry_.caller())) {
+    if (!entry_.admission().ok()) {
+      RenderSequenceCall::Finish(entry_.admission());
     } else {
       handler_->Start();
     }
@@ -158,7 +176,7 @@ class RenderSequenceCall final
   void Write(const v1::RenderSequenceResponse& message) override { StartWrite(&message); }
   void Finish(const absl::Status& status) override { Reactor::Finish(ToGrpc(status, context_)); }
 
-  const CallToken token_;
+  const CallEntry entry_;
   CallbackServerContext& context_;
   const std::shared_ptr<RenderSequenceHandler> handler_;
   v1::RenderSequenceRequest request_;
@@ -168,7 +186,7 @@ class RenderSequenceCall final
 
 class RenderService::Calls final : public v1::RenderService::CallbackService {
  public:
-  explicit Calls(const Backend& backend) : backend_(backend) {}
+  Calls(const Backend& backend, const Access& access) : backend_(backend), access_(access) {}
 
   CallCount& count() { return count_; }
 
@@ -189,26 +207,26 @@ class RenderService::Calls final : public v1::RenderService::CallbackService {
 
   grpc::ServerReadReactor<v1::UploadParticlesRequest>* UploadParticles(
       CallbackServerContext* context, v1::UploadParticlesResponse* response) override {
-    return new UploadCall(backend_, count_, *context, *response);
+    return new UploadCall(shared_, *context, *response);
   }
 
   grpc::ServerWriteReactor<v1::RenderFrameResponse>* RenderFrame(
       CallbackServerContext* context, const v1::RenderFrameRequest* request) override {
-    return new RenderFrameCall(backend_, count_, *context, *request);
+    return new RenderFrameCall(shared_, *context, *request);
   }
 
   grpc::ServerBidiReactor<v1::RenderSequenceRequest, v1::RenderSequenceResponse>* RenderSequence(
       CallbackServerContext* context) override {
-    return new RenderSequenceCall(backend_, count_, *context);
+    return new RenderSequenceCall(shared_, *context);
   }
 
  private:
   template <typename Response, typename Handler>
   grpc::ServerUnaryReactor* AnswerAtOnce(CallbackServerContext& context, Response& response,
                                          const Handler& handler) {
-    const CallToken token(count_);
-    absl::Status status = DrainingError();
-    if (!token.refused()) {
+    const CallEntry entry(count_, access_, context);
+    absl::Status status = entry.admission();
+    if (status.ok()) {
       auto answer = handler();
       status = answer.status();
       if (answer.ok()) {
@@ -221,10 +239,13 @@ class RenderService::Calls final : public v1::RenderService::CallbackService {
   }
 
   const Backend backend_;
+  const Access& access_;
   CallCount count_;
+  const Shared shared_{backend_, access_, count_};
 };
 
-RenderService::RenderService(const Backend& backend) : calls_(std::make_unique<Calls>(backend)) {}
+RenderService::RenderService(const Backend& backend, const Access& access)
+    : calls_(std::make_unique<Calls>(backend, access)) {}
 
 RenderService::~RenderService() = default;
 

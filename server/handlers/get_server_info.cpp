@@ -24,6 +24,10 @@ v1::GetServerInfoResponse GetServerInfo(const Backend& backend) {
   told.set_max_output_bytes(limits.max_output_bytes);
   told.set_max_message_bytes(limits.max_message_bytes);
   told.set_max_queued_frames(limits.max_queued_frames);
+  told.set_max_connections(limits.max_connections);
+  told.set_max_connection_streams(limits.max_connection_streams);
+  told.set_max_handshake_seconds(limits.max_handshake_seconds);
+  told.set_max_idle_seconds(limits.max_idle_seconds);
 
   for (const auto& row : kTechniques) {
     response.add_techniques(row.proto);

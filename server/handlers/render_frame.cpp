@@ -11,7 +11,7 @@ namespace halflight {
 
 void RenderFrameHandler::Start(const v1::RenderFrameRequest& request) {
   if (const absl::Status status = Submit(request); !status.ok()) {
-    spdlog::info(RefusalLogLine(request.request_id(), status));
+    spdlog::info(RefusalLogLine(request.request_id(), caller_, status));
     sink_.Finish(status);
   }
 }
@@ -21,6 +21,7 @@ absl::Status RenderFrameHandler::Submit(const v1::RenderFrameRequest& request) {
   if (!job.ok()) {
     return job.status();
   }
+  job->caller = caller_;
   return backend_.pipeline.Submit(
       *std::move(job), stop_.get_token(),
       [self = shared_from_this()](const auto& frame) { self->OnFrame(frame); });

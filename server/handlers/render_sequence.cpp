@@ -22,6 +22,7 @@ void RenderSequenceHandler::OnRequest(const v1::RenderSequenceRequest& request) 
     slots_.back()->index = next_index_++;
     if (job.ok()) {
       waiting_ = *std::move(job);
+      waiting_->caller = caller_;
       may_submit_ = true;
     } else {
       Refuse(*slots_.back(), request.frame().request_id(), job.status());
@@ -33,7 +34,7 @@ void RenderSequenceHandler::OnRequest(const v1::RenderSequenceRequest& request) 
 // Under the mutex. The stream ends with this frame.
 void RenderSequenceHandler::Refuse(Slot& slot, const std::string& request_id,
                                    const absl::Status& status) {
-  spdlog::info(RefusalLogLine(request_id, status));
+  spdlog::info(RefusalLogLine(request_id, caller_, status));
   slot.result = status;
   requests_ended_ = true;
 }

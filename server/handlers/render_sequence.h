@@ -10,8 +10,10 @@
 #include <optional>
 #include <stop_token>
 #include <string>
+#include <utility>
 
 #include "halflight/v1/service.pb.h"
+#include "server/caller.h"
 #include "server/handlers/backend.h"
 #include "server/handlers/frame_messages.h"
 #include "server/handlers/sequence_state.h"
@@ -33,8 +35,9 @@ inline constexpr size_t kFramesAhead = 4;
 // A stream never fails because its own frames fill the queue: the next one then waits for them.
 class RenderSequenceHandler : public std::enable_shared_from_this<RenderSequenceHandler> {
  public:
-  RenderSequenceHandler(const Backend& backend, DuplexSink<v1::RenderSequenceResponse>& sink)
-      : backend_(backend), sink_(sink) {}
+  RenderSequenceHandler(const Backend& backend, DuplexSink<v1::RenderSequenceResponse>& sink,
+                        Caller caller = {})
+      : backend_(backend), sink_(sink), caller_(std::move(caller)) {}
 
   // Once, first.
   void Start() { Advance(); }
@@ -65,6 +68,7 @@ class RenderSequenceHandler : public std::enable_shared_from_this<RenderSequence
 
   const Backend backend_;
   DuplexSink<v1::RenderSequenceResponse>& sink_;
+  const Caller caller_;
   std::stop_source stop_;
 
   // Touched only by the thread that completes a read; reads are one at a time.
