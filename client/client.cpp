@@ -6,6 +6,8 @@
 #include <utility>
 
 #include "client/client_impl.h"
+#include "client/frame_calls.h"
+#include "client/frame_reader.h"
 #include "client/readers/text.h"
 #include "client/security.h"
 #include "client/status_text.h"
@@ -200,18 +202,24 @@ absl::Status Client::Impl::EnsureUploaded(const EncodedParticles& particles, std
 
 absl::StatusOr<RenderedFrame> Client::Impl::RenderOnce(grpc::ClientContext& context,
                                                        const v1::RenderFrameRequest& request) {
-  const auto reader = stub_->RenderFrame(&context, request);
-  v1::RenderFrameResponse message;
+  const auto reader = CallRenderFrame(*channel_, context, request);
+  grpc::ByteBuffer bytes;
+  IncomingMessage<v1::RenderFrameResponse> incoming;
+  const v1::RenderFrameResponse& message = incoming.message;
   FrameAssembler assembler;
   bool complete = false;
   absl::Status status;
-  while (status.ok() && reader->Read(&message)) {
+  while (status.ok() && reader->Read(&bytes)) {
+    status = Read(bytes, incoming);
+    if (!status.ok()) {
+      break;
+    }
     switch (message.part_case()) {
       case v1::RenderFrameResponse::kHeader:
         status = assembler.AddHeader(message.header());
         break;
       case v1::RenderFrameResponse::kChunk:
-        status = assembler.AddChunk(message.chunk());
+        status = assembler.AddChunk(message.chunk(), incoming.chunk_data);
         break;
       case v1::RenderFrameResponse::kTrailer:
         status = assembler.AddTrailer(message.trailer());

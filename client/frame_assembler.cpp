@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <numeric>
 #include <utility>
 
 #include "halflight/crc32c.h"
@@ -40,7 +41,8 @@ void FrameAssembler::SealComplete() {
   }
 }
 
-absl::Status FrameAssembler::AddChunk(const v1::OutputChunk& chunk) {
+absl::Status FrameAssembler::AddChunk(const v1::OutputChunk& chunk,
+                                      const std::vector<std::string_view>& data) {
   if (!started_) {
     return absl::DataLossError("a chunk came before the frame's header");
   }
@@ -53,13 +55,18 @@ absl::Status FrameAssembler::AddChunk(const v1::OutputChunk& chunk) {
   }
   std::string& output = frame_.outputs[current];
   const uint64_t size = frame_.header.outputs(static_cast<int>(current)).byte_size();
-  if (chunk.offset() != output.size() || chunk.data().size() > size - output.size()) {
+  const size_t bytes =
+      std::accumulate(data.begin(), data.end(), size_t{0},
+                      [](size_t sum, std::string_view piece) { return sum + piece.size(); });
+  if (chunk.offset() != output.size() || bytes > size - output.size()) {
     return absl::DataLossError(fmt::format(
         "output {}: a chunk of {} bytes came at offset {}, expected offset {} of {} bytes in all",
-        current, chunk.data().size(), chunk.offset(), output.size(), size));
+        current, bytes, chunk.offset(), output.size(), size));
   }
-  output += chunk.data();
-  crc32c_ = ExtendCrc32c(crc32c_, chunk.data());
+  for (const std::string_view piece : data) {
+    output += piece;
+    crc32c_ = ExtendCrc32c(crc32c_, piece);  // while the processor has it near
+  }
   SealComplete();
   return absl::OkStatus();
 }

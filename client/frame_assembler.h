@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "absl/status/status.h"
@@ -20,7 +21,8 @@ struct RenderedFrame {
 class FrameAssembler {
  public:
   absl::Status AddHeader(const v1::FrameHeader& header);
-  absl::Status AddChunk(const v1::OutputChunk& chunk);
+  // `chunk` without its data, which comes in pieces.
+  absl::Status AddChunk(const v1::OutputChunk& chunk, const std::vector<std::string_view>& data);
   // Completes the frame.
   absl::Status AddTrailer(const v1::FrameTrailer& trailer);
 

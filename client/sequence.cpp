@@ -10,14 +10,14 @@
 #include <utility>
 
 #include "client/client_impl.h"
+#include "client/frame_calls.h"
+#include "client/frame_reader.h"
 #include "client/readers/text.h"
 #include "client/status_text.h"
 
 namespace halflight::client {
 
 namespace {
-
-using Stream = grpc::ClientReaderWriter<v1::RenderSequenceRequest, v1::RenderSequenceResponse>;
 
 // How far sender and receiver of one stream are.
 class Progress {
@@ -76,17 +76,17 @@ struct Outcome {
 };
 
 // One stream, from frame `first` on.
-class SequenceStream {
+class SequenceCall {
  public:
   // Sends frame `index`; a false `open` means that the stream takes no more.
-  using SendFrame = std::function<absl::Status(uint64_t index, Stream& stream,
+  using SendFrame = std::function<absl::Status(uint64_t index, SequenceStream& stream,
                                                const std::stop_token&, bool& open)>;
 
-  SequenceStream(v1::RenderService::Stub& stub, std::string_view route, const std::string& token,
-                 uint64_t first, uint64_t count)
+  SequenceCall(grpc::ChannelInterface& channel, std::string_view route, const std::string& token,
+               uint64_t first, uint64_t count)
       : first_(first), count_(count), next_(first), progress_(first) {
     SetMetadata(context_, route, token);
-    stream_ = stub.RenderSequence(&context_);
+    stream_ = CallRenderSequence(channel, context_);
   }
 
   // Runs the stream to its end.
@@ -162,10 +162,15 @@ class SequenceStream {
   }
 
   absl::Status Receive(const FrameSink& sink) {
-    v1::RenderSequenceResponse message;
+    grpc::ByteBuffer bytes;
+    IncomingMessage<v1::RenderSequenceResponse> incoming;
+    const v1::RenderSequenceResponse& message = incoming.message;
     FrameAssembler assembler;
-    while (stream_->Read(&message)) {
+    while (stream_->Read(&bytes)) {
       progress_.SignOfLife();
+      if (absl::Status status = Read(bytes, incoming); !status.ok()) {
+        return status;
+      }
       if (message.frame_index() != next_ - first_) {
         return absl::DataLossError(fmt::format("frame {} came where frame {} was to come",
                                                first_ + message.frame_index(), next_));
@@ -176,7 +181,7 @@ class SequenceStream {
           status = assembler.AddHeader(message.header());
           break;
         case v1::RenderSequenceResponse::kChunk:
-          status = assembler.AddChunk(message.chunk());
+          status = assembler.AddChunk(message.chunk(), incoming.chunk_data);
           break;
         case v1::RenderSequenceResponse::kTrailer:
           status = assembler.AddTrailer(message.trailer());
@@ -203,7 +208,7 @@ class SequenceStream {
   uint64_t next_;
   Progress progress_;
   grpc::ClientContext context_;
-  std::unique_ptr<Stream> stream_;
+  std::unique_ptr<SequenceStream> stream_;
   std::atomic<bool> timed_out_ = false;
   absl::Status send_error_;
 };
@@ -223,7 +228,7 @@ absl::Status Client::Impl::RenderSequence(uint64_t count, const FrameSource& sou
     const SequenceFrame& frame = **first_frame;
     route = frame.particles ? frame.particles->sha256 : frame.request.scene().particle_sha256();
   }
-  auto send = [&](uint64_t index, Stream& stream, const std::stop_token& stop,
+  auto send = [&](uint64_t index, SequenceStream& stream, const std::stop_token& stop,
                   bool& open) -> absl::Status {
     absl::StatusOr<SequenceFrame> frame =
         first_frame ? *std::exchange(first_frame, std::nullopt) : source(index);
@@ -247,7 +252,7 @@ absl::Status Client::Impl::RenderSequence(uint64_t count, const FrameSource& sou
   int tries = 1;
   Backoff backoff(options_.first_backoff);
   while (next < count) {
-    SequenceStream stream(*stub_, route, options_.security.token, next, count);
+    SequenceCall stream(*channel_, route, options_.security.token, next, count);
     const auto [status, from_server] =
         stream.Run(send, sink, read_ahead, options_.timeout, options_.stop);
     if (options_.stop.stop_requested()) {

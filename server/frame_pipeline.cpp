@@ -56,6 +56,7 @@ struct FramePipeline::Flight {
   Clock::time_point encode_begin;
   std::mutex mutex;
   std::atomic<size_t> outputs_left = 0;
+  std::vector<SharedImage> images;  // the frame's, whose own have their shapes only from then on
   std::vector<EncodedImage> encoded;
 };
 
@@ -72,7 +73,8 @@ FramePipeline::~FramePipeline() {
 }
 
 void FramePipeline::WarmUp() {
-  const Image image{16, 16, 1, {"R", "G", "B", "A"}, std::vector<float>(size_t{16} * 16 * 4, 0.5F)};
+  const auto image = std::make_shared<const Image>(
+      Image{16, 16, 1, {"R", "G", "B", "A"}, std::vector<float>(size_t{16} * 16 * 4, 0.5F)});
   for (const ImageFormat format : {ImageFormat::kPng8, ImageFormat::kExrHalf}) {
     // A frame that needs the format says what is wrong with it.
     options_.encode(image, ImageKind::kBeauty, {}, {format}, {}).IgnoreError();
@@ -249,6 +251,11 @@ void FramePipeline::Encode(const FlightPtr& flight) {
     frame.rendered.timings.push_back({"error", frame.error->milliseconds});
   }
   flight->encode_begin = Clock::now();
+  for (Image& image : frame.rendered.images) {
+    std::vector<float> pixels = std::exchange(image.pixels, {});
+    flight->images.push_back(std::make_shared<const Image>(
+        Image{image.width, image.height, image.layers, image.channels, std::move(pixels)}));
+  }
   const size_t outputs = flight->job.outputs.size();
   flight->encoded.resize(outputs);
   flight->outputs_left = outputs;
@@ -261,7 +268,7 @@ void FramePipeline::EncodeOutput(const FlightPtr& flight, size_t index) {
   const OutputJob& output = flight->job.outputs[index];
   absl::StatusOr<EncodedImage> encoded = absl::CancelledError("the call was cancelled");
   if (!flight->stop.stop_requested()) {
-    encoded = options_.encode(flight->frame.rendered.images[output.image], output.shown.kind,
+    encoded = options_.encode(flight->images[output.image], output.shown.kind,
                               output.shown.quantity, output.encoding,
                               DescribeImage(flight->job, flight->frame, output, engine_.device(),
                                             options_.server_version));
@@ -304,8 +311,10 @@ void FramePipeline::Complete(const FlightPtr& flight) {
   } else {
     answer = flight->outcome;
   }
-  // Pixels go before the answer does: a slow reader shall hold the encoded bytes only.
+  // Pixels go before the answer does: a slow reader shall hold the encoded bytes only, which are
+  // the pixels where raw floats were asked for.
   flight->frame = {};
+  flight->images.clear();
   {
     const std::lock_guard lock(mutex_);
     --queued_;

@@ -30,7 +30,7 @@ namespace halflight {
 // sending.
 struct EncodedFrame {
   v1::FrameHeader header;
-  std::vector<std::string> outputs;  // bytes, in the request's order
+  std::vector<SharedBytes> outputs;  // in the request's order
 };
 
 struct PipelineOptions {
@@ -41,7 +41,7 @@ struct PipelineOptions {
   bool warm_up = false;
   std::string server_version = "unknown";
   // What makes bytes of pixels; any thread.
-  std::function<absl::StatusOr<EncodedImage>(const Image&, ImageKind, LightQuantity,
+  std::function<absl::StatusOr<EncodedImage>(const SharedImage&, ImageKind, LightQuantity,
                                              const EncodeSettings&, const ImageMetadata&)>
       encode = EncodeImage;
   // What holds a beauty against the image model; one thread of the pipeline, one frame at a time.

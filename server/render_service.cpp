@@ -6,11 +6,13 @@
 
 #include "absl/status/status.h"
 #include "halflight/v1/service.grpc.pb.h"
+#include "server/caller.h"
 #include "server/handlers/find_missing_particles.h"
 #include "server/handlers/get_server_info.h"
 #include "server/handlers/render_frame.h"
 #include "server/handlers/render_sequence.h"
 #include "server/handlers/upload_particles.h"
+#include "server/message_buffer.h"
 #include "server/status_to_grpc.h"
 
 // The callback API deletes a reactor in OnDone, which comes after Finish and after every reaction
@@ -32,53 +34,55 @@ struct CallCount {
 
 // One call under way, and whose it is. Counted before draining is looked at, so that whoever drains
 // and then sees no calls can be sure that none slips in.
-class CallEntry {
+class CallToken {
  public:
-  CallEntry(CallCount& count, const Access& access, const CallbackServerContext& context)
-      : count_(count), caller_(Enter(count, access, context)) {}
-  ~CallEntry() { --count_.active; }
-  CallEntry(const CallEntry&) = delete;
-  CallEntry& operator=(const CallEntry&) = delete;
-  CallEntry(CallEntry&&) = delete;
-  CallEntry& operator=(CallEntry&&) = delete;
+  CallToken(CallCount& count, const Access& access, const CallbackServerContext& context)
+      : count_(count) {
+    ++count_.active;
+    ++count_.begun;
+    if (count_.draining) {
+      refusal_ = absl::UnavailableError("the server is shutting down: retry elsewhere or later");
+      return;
+    }
+    auto caller = access.Identify(context);
+    refusal_ = caller.status();
+    if (caller.ok()) {
+      caller_ = *std::move(caller);
+    }
+  }
+  ~CallToken() { --count_.active; }
+  CallToken(const CallToken&) = delete;
+  CallToken& operator=(const CallToken&) = delete;
+  CallToken(CallToken&&) = delete;
+  CallToken& operator=(CallToken&&) = delete;
 
-  // OK, or what the call has to end with.
-  [[nodiscard]] const absl::Status& admission() const { return caller_.status(); }
-  // Nobody where it is not admitted.
-  [[nodiscard]] Caller caller() const { return caller_.ok() ? *caller_ : Caller(); }
+  // Why the call is not served, or OK.
+  [[nodiscard]] const absl::Status& refusal() const { return refusal_; }
+  // Nobody where it is refused.
+  [[nodiscard]] const Caller& caller() const { return caller_; }
 
  private:
-  static absl::StatusOr<Caller> Enter(CallCount& count, const Access& access,
-                                      const CallbackServerContext& context) {
-    ++count.active;
-    ++count.begun;
-    if (count.draining) {
-      return absl::UnavailableError("the server is shutting down: retry elsewhere or later");
-    }
-    return access.Identify(context);
-  }
-
   CallCount& count_;
-  const absl::StatusOr<Caller> caller_;
+  absl::Status refusal_;
+  Caller caller_;
 };
 
-// What the calls of the service share. References: the service has them.
+// What all calls of a service share.
 struct Shared {
-  const Backend& backend;
+  const Backend backend;
   const Access& access;
-  CallCount& count;
+  CallCount count;
 };
 
 class UploadCall final : public grpc::ServerReadReactor<v1::UploadParticlesRequest> {
  public:
-  UploadCall(const Shared& shared, CallbackServerContext& context,
-             v1::UploadParticlesResponse& response)
-      : entry_(shared.count, shared.access, context),
+  UploadCall(Shared& shared, CallbackServerContext& context, v1::UploadParticlesResponse& response)
+      : token_(shared.count, shared.access, context),
         context_(context),
         response_(response),
         handler_(shared.backend) {
-    if (!entry_.admission().ok()) {
-      Answer(entry_.admission());
+    if (!token_.refusal().ok()) {
+      Answer(token_.refusal());
     } else {
       StartRead(&request_);
     }
@@ -106,27 +110,35 @@ class UploadCall final : public grpc::ServerReadReactor<v1::UploadParticlesReque
     Finish(ToGrpc(answer.status(), context_));
   }
 
-  const CallEntry entry_;
+  const CallToken token_;
   CallbackServerContext& context_;
   v1::UploadParticlesResponse& response_;
   UploadParticlesHandler handler_;
   v1::UploadParticlesRequest request_;
 };
 
-class RenderFrameCall final : public grpc::ServerWriteReactor<v1::RenderFrameResponse>,
+// What sends frames takes messages in bytes, so that chunks need not be copied into messages first.
+template <typename Message>
+bool Parse(grpc::ByteBuffer bytes, Message& message) {
+  return grpc::SerializationTraits<Message>::Deserialize(&bytes, &message).ok();
+}
+
+class RenderFrameCall final : public grpc::ServerWriteReactor<grpc::ByteBuffer>,
                               public ResponseSink<v1::RenderFrameResponse> {
-  using Reactor = grpc::ServerWriteReactor<v1::RenderFrameResponse>;
+  using Reactor = grpc::ServerWriteReactor<grpc::ByteBuffer>;
 
  public:
-  RenderFrameCall(const Shared& shared, CallbackServerContext& context,
-                  const v1::RenderFrameRequest& request)
-      : entry_(shared.count, shared.access, context),
+  RenderFrameCall(Shared& shared, CallbackServerContext& context, const grpc::ByteBuffer& request)
+      : token_(shared.count, shared.access, context),
         context_(context),
-        handler_(std::make_shared<RenderFrameHandler>(shared.backend, *this, entry_.caller())) {
-    if (!entry_.admission().ok()) {
-      RenderFrameCall::Finish(entry_.admission());
+        handler_(std::make_shared<RenderFrameHandler>(shared.backend, *this, token_.caller())) {
+    if (v1::RenderFrameRequest message; !token_.refusal().ok()) {
+      RenderFrameCall::Finish(token_.refusal());
+    } else if (!Parse(request, message)) {
+      RenderFrameCall::Finish(
+          absl::InvalidArgumentError("the message is not a RenderFrameRequest"));
     } else {
-      handler_->Start(request);
+      handler_->Start(message);
     }
   }
 
@@ -135,36 +147,41 @@ class RenderFrameCall final : public grpc::ServerWriteReactor<v1::RenderFrameRes
   void OnDone() override { delete this; }
 
  private:
-  void Write(const v1::RenderFrameResponse& message) override { StartWrite(&message); }
+  void Write(const OutgoingMessage<v1::RenderFrameResponse>& outgoing) override {
+    response_ = ToByteBuffer(outgoing);
+    StartWrite(&response_);
+  }
   void Finish(const absl::Status& status) override { Reactor::Finish(ToGrpc(status, context_)); }
 
-  const CallEntry entry_;
+  const CallToken token_;
   CallbackServerContext& context_;
   const std::shared_ptr<RenderFrameHandler> handler_;
+  grpc::ByteBuffer response_;
 };
 
-class RenderSequenceCall final
-    : public grpc::ServerBidiReactor<v1::RenderSequenceRequest, v1::RenderSequenceResponse>,
-      public DuplexSink<v1::RenderSequenceResponse> {
-  using Reactor = grpc::ServerBidiReactor<v1::RenderSequenceRequest, v1::RenderSequenceResponse>;
+class RenderSequenceCall final : public grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer>,
+                                 public DuplexSink<v1::RenderSequenceResponse> {
+  using Reactor = grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer>;
 
  public:
-  RenderSequenceCall(const Shared& shared, CallbackServerContext& context)
-      : entry_(shared.count, shared.access, context),
+  RenderSequenceCall(Shared& shared, CallbackServerContext& context)
+      : token_(shared.count, shared.access, context),
         context_(context),
-        handler_(std::make_shared<RenderSequenceHandler>(shared.backend, *this, entry_.caller())) {
-    if (!entry_.admission().ok()) {
-      RenderSequenceCall::Finish(entry_.admission());
+        handler_(std::make_shared<RenderSequenceHandler>(shared.backend, *this, token_.caller())) {
+    if (!token_.refusal().ok()) {
+      RenderSequenceCall::Finish(token_.refusal());
     } else {
       handler_->Start();
     }
   }
 
   void OnReadDone(bool ok) override {
-    if (ok) {
-      handler_->OnRequest(request_);
-    } else {
+    if (v1::RenderSequenceRequest message; !ok) {
       handler_->OnEndOfRequests();
+    } else if (!Parse(request_, message)) {
+      handler_->OnUnreadableRequest();
+    } else {
+      handler_->OnRequest(message);
     }
   }
   void OnWriteDone(bool ok) override { handler_->OnWritten(ok); }
@@ -173,28 +190,39 @@ class RenderSequenceCall final
 
  private:
   void Read() override { StartRead(&request_); }
-  void Write(const v1::RenderSequenceResponse& message) override { StartWrite(&message); }
+  void Write(const OutgoingMessage<v1::RenderSequenceResponse>& outgoing) override {
+    response_ = ToByteBuffer(outgoing);
+    StartWrite(&response_);
+  }
   void Finish(const absl::Status& status) override { Reactor::Finish(ToGrpc(status, context_)); }
 
-  const CallEntry entry_;
+  const CallToken token_;
   CallbackServerContext& context_;
   const std::shared_ptr<RenderSequenceHandler> handler_;
-  v1::RenderSequenceRequest request_;
+  grpc::ByteBuffer request_;
+  grpc::ByteBuffer response_;
 };
+
+using Rpcs = v1::RenderService;
+using CallbackService =
+    Rpcs::WithCallbackMethod_GetServerInfo<Rpcs::WithCallbackMethod_FindMissingParticles<
+        Rpcs::WithCallbackMethod_UploadParticles<Rpcs::WithRawCallbackMethod_RenderFrame<
+            Rpcs::WithRawCallbackMethod_RenderSequence<Rpcs::Service>>>>>;
 
 }  // namespace
 
-class RenderService::Calls final : public v1::RenderService::CallbackService {
+class RenderService::Calls final : public CallbackService {
  public:
-  Calls(const Backend& backend, const Access& access) : backend_(backend), access_(access) {}
+  Calls(const Backend& backend, const Access& access)
+      : shared_{.backend = backend, .access = access, .count = {}} {}
 
-  CallCount& count() { return count_; }
+  CallCount& count() { return shared_.count; }
 
   grpc::ServerUnaryReactor* GetServerInfo(CallbackServerContext* context,
                                           const v1::GetServerInfoRequest* /*request*/,
                                           v1::GetServerInfoResponse* response) override {
     return AnswerAtOnce(*context, *response, [&]() -> absl::StatusOr<v1::GetServerInfoResponse> {
-      return halflight::GetServerInfo(backend_);
+      return halflight::GetServerInfo(shared_.backend);
     });
   }
 
@@ -202,7 +230,7 @@ class RenderService::Calls final : public v1::RenderService::CallbackService {
       CallbackServerContext* context, const v1::FindMissingParticlesRequest* request,
       v1::FindMissingParticlesResponse* response) override {
     return AnswerAtOnce(*context, *response,
-                        [&] { return halflight::FindMissingParticles(backend_, *request); });
+                        [&] { return halflight::FindMissingParticles(shared_.backend, *request); });
   }
 
   grpc::ServerReadReactor<v1::UploadParticlesRequest>* UploadParticles(
@@ -210,12 +238,12 @@ class RenderService::Calls final : public v1::RenderService::CallbackService {
     return new UploadCall(shared_, *context, *response);
   }
 
-  grpc::ServerWriteReactor<v1::RenderFrameResponse>* RenderFrame(
-      CallbackServerContext* context, const v1::RenderFrameRequest* request) override {
+  grpc::ServerWriteReactor<grpc::ByteBuffer>* RenderFrame(
+      CallbackServerContext* context, const grpc::ByteBuffer* request) override {
     return new RenderFrameCall(shared_, *context, *request);
   }
 
-  grpc::ServerBidiReactor<v1::RenderSequenceRequest, v1::RenderSequenceResponse>* RenderSequence(
+  grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer>* RenderSequence(
       CallbackServerContext* context) override {
     return new RenderSequenceCall(shared_, *context);
   }
@@ -224,8 +252,8 @@ class RenderService::Calls final : public v1::RenderService::CallbackService {
   template <typename Response, typename Handler>
   grpc::ServerUnaryReactor* AnswerAtOnce(CallbackServerContext& context, Response& response,
                                          const Handler& handler) {
-    const CallEntry entry(count_, access_, context);
-    absl::Status status = entry.admission();
+    const CallToken token(shared_.count, shared_.access, context);
+    absl::Status status = token.refusal();
     if (status.ok()) {
       auto answer = handler();
       status = answer.status();
@@ -238,10 +266,7 @@ class RenderService::Calls final : public v1::RenderService::CallbackService {
     return reactor;
   }
 
-  const Backend backend_;
-  const Access& access_;
-  CallCount count_;
-  const Shared shared_{backend_, access_, count_};
+  Shared shared_;
 };
 
 RenderService::RenderService(const Backend& backend, const Access& access)

@@ -107,11 +107,11 @@ absl::Status CheckText(const ImageMetadata& metadata) {
 
 }  // namespace
 
-absl::StatusOr<EncodedImage> EncodeImage(const Image& image, ImageKind kind, LightQuantity quantity,
-                                         const EncodeSettings& settings,
+absl::StatusOr<EncodedImage> EncodeImage(const SharedImage& image, ImageKind kind,
+                                         LightQuantity quantity, const EncodeSettings& settings,
                                          const ImageMetadata& metadata) {
-  if (absl::Status status = CheckChannels(image.channels, kind); !status.ok()) return status;
-  if (absl::Status status = CheckSizes(image, metadata); !status.ok()) return status;
+  if (absl::Status status = CheckChannels(image->channels, kind); !status.ok()) return status;
+  if (absl::Status status = CheckSizes(*image, metadata); !status.ok()) return status;
   if (absl::Status status = CheckText(metadata); !status.ok()) return status;
   const auto* const row =
       std::find_if(kFormats.begin(), kFormats.end(),

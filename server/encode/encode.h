@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <utility>
@@ -15,6 +16,7 @@
 #include "absl/status/statusor.h"
 #include "renderer/image.h"
 #include "renderer/scene.h"
+#include "server/encode/shared_bytes.h"
 
 namespace halflight {
 
@@ -41,11 +43,14 @@ struct ImageMetadata {
 };
 
 struct EncodedImage {
-  std::string bytes;
+  SharedBytes bytes;
   const char* media_type;
   // The values drawn as white and as black, where the format needed the pixels scaled.
   std::optional<std::pair<double, double>> white_black;
 };
+
+// Raw floats are the image's own pixels, which the bytes then keep alive instead of copying them.
+using SharedImage = std::shared_ptr<const Image>;
 
 // The same arguments give the same bytes. `quantity` matters to light buffers only. InvalidArgument
 // where the image is not what its kind says (channels, sizes), or holds what the format cannot:
@@ -54,8 +59,8 @@ struct EncodedImage {
 //
 // PNG loses, knowingly: what is below 0 or above 1, the sign of errors, and emission where alpha is
 // 0, since colours are stored unassociated.
-absl::StatusOr<EncodedImage> EncodeImage(const Image& image, ImageKind kind, LightQuantity quantity,
-                                         const EncodeSettings& settings,
+absl::StatusOr<EncodedImage> EncodeImage(const SharedImage& image, ImageKind kind,
+                                         LightQuantity quantity, const EncodeSettings& settings,
                                          const ImageMetadata& metadata);
 
 }  // namespace halflight

@@ -8,7 +8,7 @@ namespace halflight {
 
 // Valid: EncodeImage has checked channels, sizes and text. Refers to EncodeImage's arguments.
 struct EncodeInput {
-  const Image& image;
+  const SharedImage& image;
   ImageKind kind;
   LightQuantity quantity;
   const EncodeSettings& settings;

@@ -73,7 +73,7 @@ void AddAttributes(const EncodeInput& input, ImageFile& file) {
 }
 
 absl::StatusOr<EncodedImage> EncodeExr(const EncodeInput& input, SampleType stored) {
-  const Image& image = input.image;
+  const Image& image = *input.image;
   ImageFile file{.format = "exr",
                  .width = image.width,
                  .height = image.height,
@@ -92,15 +92,17 @@ absl::StatusOr<EncodedImage> EncodeExr(const EncodeInput& input, SampleType stor
     }
   }
   EncodedImage encoded{};
-  const absl::Status status = WriteToMemory(file, image.pixels.data(), encoded.bytes);
+  std::string bytes;
+  const absl::Status status = WriteToMemory(file, image.pixels.data(), bytes);
   if (!status.ok()) return status;
+  encoded.bytes = SharedBytes(std::move(bytes));
   return encoded;
 }
 
 }  // namespace
 
 absl::StatusOr<EncodedImage> EncodeExrHalf(const EncodeInput& input) {
-  const std::vector<float>& pixels = input.image.pixels;
+  const std::vector<float>& pixels = input.image->pixels;
   const auto too_large = std::find_if(pixels.begin(), pixels.end(), [](float value) {
     return std::isfinite(value) && std::abs(value) >= kBeyondHalf;
   });

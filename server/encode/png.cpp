@@ -49,7 +49,7 @@ std::optional<Range> FindRange(const EncodeInput& input) {
   }
   float smallest = std::numeric_limits<float>::infinity();
   float largest = -smallest;
-  for (const float value : input.image.pixels) {
+  for (const float value : input.image->pixels) {
     if (!std::isfinite(value)) continue;
     smallest = std::min(smallest, value);
     largest = std::max(largest, value);
@@ -77,7 +77,7 @@ std::vector<Integer> QuantizeBeauty(const std::vector<float>& pixels) {
 
 template <typename Integer>
 std::vector<Integer> QuantizeLinear(const EncodeInput& input, const std::optional<Range>& range) {
-  const std::vector<float>& pixels = input.image.pixels;
+  const std::vector<float>& pixels = input.image->pixels;
   std::vector<Integer> codes(pixels.size());
   if (!range.has_value()) {
     const bool nothing_seen = input.kind == ImageKind::kDepth;
@@ -101,7 +101,7 @@ std::vector<Integer> QuantizeLinear(const EncodeInput& input, const std::optiona
 
 template <typename Integer>
 absl::StatusOr<EncodedImage> EncodePng(const EncodeInput& input) {
-  const Image& image = input.image;
+  const Image& image = *input.image;
   const int64_t rows = static_cast<int64_t>(image.height) * image.layers;
   if (rows > kMostRows) {
     return absl::InvalidArgumentError(
@@ -136,8 +136,10 @@ absl::StatusOr<EncodedImage> EncodePng(const EncodeInput& input) {
   }
   const std::vector<Integer> codes =
       beauty ? QuantizeBeauty<Integer>(image.pixels) : QuantizeLinear<Integer>(input, range);
-  const absl::Status status = WriteToMemory(file, codes.data(), encoded.bytes);
+  std::string bytes;
+  const absl::Status status = WriteToMemory(file, codes.data(), bytes);
   if (!status.ok()) return status;
+  encoded.bytes = SharedBytes(std::move(bytes));
   return encoded;
 }
 

@@ -7,7 +7,7 @@
 
 namespace halflight {
 
-// Layer by layer, row by row from the top, channels interleaved.
+// Layer by layer, row by row from the top, channels interleaved. Copies nothing.
 absl::StatusOr<EncodedImage> EncodeRawFloat(const EncodeInput& input);
 
 }  // namespace halflight

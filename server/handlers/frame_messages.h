@@ -1,17 +1,16 @@
 // A finished frame cut into the messages it is sent as: header, chunks of every output, trailer.
-// Copies and checksums one chunk at a time, so that the peer receives and checks one chunk while
-// the next is made ready; sends nothing.
+// Checksums one chunk at a time, so that the peer receives and checks one chunk while the next is
+// made ready; copies no output and sends nothing.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
 #include <memory>
-#include <string>
-#include <string_view>
 #include <utility>
 
 #include "halflight/crc32c.h"
 #include "server/frame_pipeline.h"
+#include "server/handlers/sink.h"
 
 namespace halflight {
 
@@ -25,7 +24,9 @@ class FrameMessages {
   // Puts the next part into a RenderFrameResponse or RenderSequenceResponse, whose memory is used
   // again; false after the trailer.
   template <typename Response>
-  bool Next(Response& message) {
+  bool Next(OutgoingMessage<Response>& outgoing) {
+    Response& message = outgoing.message;
+    outgoing.chunk_data = {};
     switch (next_) {
       case Part::kHeader:
         *message.mutable_header() = frame_->header;
@@ -33,14 +34,12 @@ class FrameMessages {
         SealComplete();
         return true;
       case Part::kChunk: {
-        const std::string_view bytes = frame_->outputs[output_];
-        const std::string_view data = bytes.substr(offset_, kChunkBytes);
         v1::OutputChunk& chunk = *message.mutable_chunk();
         chunk.set_output_index(static_cast<uint32_t>(output_));
         chunk.set_offset(offset_);
-        chunk.set_data(data.data(), data.size());
-        crc32c_ = ExtendCrc32c(crc32c_, data);
-        offset_ += data.size();
+        outgoing.chunk_data = frame_->outputs[output_].Part(offset_, kChunkBytes);
+        crc32c_ = ExtendCrc32c(crc32c_, outgoing.chunk_data.view());
+        offset_ += outgoing.chunk_data.size();
         SealComplete();
         return true;
       }

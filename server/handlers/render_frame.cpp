@@ -45,8 +45,8 @@ void RenderFrameHandler::OnWritten(bool ok) {
 }
 
 void RenderFrameHandler::WriteNext() {
-  if (messages_->Next(message_)) {
-    sink_.Write(message_);
+  if (messages_->Next(outgoing_)) {
+    sink_.Write(outgoing_);
   } else {
     sink_.Finish(absl::OkStatus());
   }

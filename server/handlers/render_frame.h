@@ -41,7 +41,7 @@ class RenderFrameHandler : public std::enable_shared_from_this<RenderFrameHandle
   std::stop_source stop_;
   // From here on touched by one thread at a time: each step of the call starts the next.
   std::optional<FrameMessages> messages_;
-  v1::RenderFrameResponse message_;
+  OutgoingMessage<v1::RenderFrameResponse> outgoing_;
 };
 
 }  // namespace halflight

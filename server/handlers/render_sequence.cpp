@@ -14,7 +14,14 @@
 namespace halflight {
 
 void RenderSequenceHandler::OnRequest(const v1::RenderSequenceRequest& request) {
-  auto job = state_.Next(request.frame(), backend_);
+  Take(state_.Next(request.frame(), backend_), request.frame().request_id());
+}
+
+void RenderSequenceHandler::OnUnreadableRequest() {
+  Take(absl::InvalidArgumentError("the message is not a RenderSequenceRequest"), "");
+}
+
+void RenderSequenceHandler::Take(absl::StatusOr<FrameJob> job, const std::string& request_id) {
   {
     const std::lock_guard lock(mutex_);
     reading_ = false;
@@ -25,7 +32,7 @@ void RenderSequenceHandler::OnRequest(const v1::RenderSequenceRequest& request) 
       waiting_->caller = caller_;
       may_submit_ = true;
     } else {
-      Refuse(*slots_.back(), request.frame().request_id(), job.status());
+      Refuse(*slots_.back(), request_id, job.status());
     }
   }
   Advance();
@@ -132,7 +139,7 @@ void RenderSequenceHandler::Advance() {
         sink_.Read();
         break;
       case Step::kWrite:
-        sink_.Write(message_);
+        sink_.Write(outgoing_);
         break;
       case Step::kFinish:
         // The last touch of the sink, and advancing_ stays: nobody steps any more.
@@ -157,8 +164,8 @@ RenderSequenceHandler::Step RenderSequenceHandler::NextStep() {
       if (!messages_.has_value()) {
         messages_.emplace(**first.result);
       }
-      message_.set_frame_index(first.index);
-      if (messages_->Next(message_)) {
+      outgoing_.message.set_frame_index(first.index);
+      if (messages_->Next(outgoing_)) {
         writing_ = true;
         return Step::kWrite;
       }

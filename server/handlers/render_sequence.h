@@ -42,6 +42,8 @@ class RenderSequenceHandler : public std::enable_shared_from_this<RenderSequence
   // Once, first.
   void Start() { Advance(); }
   void OnRequest(const v1::RenderSequenceRequest& request);
+  // One that is no RenderSequenceRequest: refused as a frame that asks for nonsense is.
+  void OnUnreadableRequest();
   void OnEndOfRequests();
   // After each write; not ok: the peer is gone.
   void OnWritten(bool ok);
@@ -58,6 +60,7 @@ class RenderSequenceHandler : public std::enable_shared_from_this<RenderSequence
 
   enum class Step : uint8_t { kNothing, kSubmit, kRead, kWrite, kFinish };
 
+  void Take(absl::StatusOr<FrameJob> job, const std::string& request_id);
   void Refuse(Slot& slot, const std::string& request_id, const absl::Status& status);
   void Submit();
   [[nodiscard]] bool HasFramesUnderWay() const;
@@ -80,7 +83,7 @@ class RenderSequenceHandler : public std::enable_shared_from_this<RenderSequence
   std::optional<FrameJob> waiting_;          // of the last slot, to be submitted
   bool may_submit_ = false;                  // there may be room for it in the queue
   std::optional<FrameMessages> messages_;    // of the first slot
-  v1::RenderSequenceResponse message_;
+  OutgoingMessage<v1::RenderSequenceResponse> outgoing_;
   std::optional<absl::Status> end_;  // what the call ends with
   bool reading_ = false;
   bool requests_ended_ = false;

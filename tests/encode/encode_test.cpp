@@ -45,7 +45,8 @@ TEST(EncodeImage, GivesTheSameBytesASecondLaterAndOnOtherThreads) {
                                          LightQuantity::kTransmittance, SomeMetadata()),
                                   Encode(layers, ImageKind::kLightLayers, format,
                                          LightQuantity::kOpticalDepth, SomeMetadata())}) {
-        files.push_back(encoded.ok() ? encoded->bytes : encoded.status().ToString());
+        files.push_back(encoded.ok() ? std::string(encoded->bytes.view())
+                                     : encoded.status().ToString());
       }
     }
   };
@@ -62,11 +63,16 @@ TEST(EncodeImage, GivesTheSameBytesASecondLaterAndOnOtherThreads) {
 }
 
 TEST(EncodeImage, RawIsThePixelsThemselves) {
-  const Image image = MakeBeauty(5, 3);
-  const auto encoded = Encode(image, ImageKind::kBeauty, ImageFormat::kRawFloat);
+  auto image = std::make_shared<const Image>(MakeBeauty(5, 3));
+  const Image copy = *image;
+  const auto encoded = EncodeImage(image, ImageKind::kBeauty, LightQuantity::kTransmittance,
+                                   {.format = ImageFormat::kRawFloat}, {});
   ASSERT_TRUE(encoded.ok()) << encoded.status();
-  ASSERT_EQ(encoded->bytes.size(), image.pixels.size() * sizeof(float));
-  EXPECT_EQ(std::memcmp(encoded->bytes.data(), image.pixels.data(), encoded->bytes.size()), 0);
+  const std::string_view bytes = encoded->bytes.view();
+  ASSERT_EQ(bytes.size(), copy.pixels.size() * sizeof(float));
+  EXPECT_EQ(static_cast<const void*>(bytes.data()), image->pixels.data()) << "copied";
+  image.reset();
+  EXPECT_EQ(std::memcmp(bytes.data(), copy.pixels.data(), bytes.size()), 0);
   EXPECT_STREQ(encoded->media_type, "application/octet-stream");
 }
 

@@ -23,7 +23,7 @@ constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
 std::vector<DecodedPart> DecodeExr(const absl::StatusOr<EncodedImage>& encoded) {
   EXPECT_TRUE(encoded.ok()) << encoded.status();
-  return Decode(encoded.ok() ? encoded->bytes : "", "exr");
+  return Decode(encoded.ok() ? std::string(encoded->bytes.view()) : "", "exr");
 }
 
 // OpenEXR's own rule: a row vector from the left.
@@ -40,7 +40,7 @@ glm::dvec4 RowTimesMatrix(const glm::dvec4& row, const std::array<float, 16>& ma
 }
 
 // The header's field as it stands in the file: name, zero, type, zero.
-bool HasField(const std::string& bytes, const std::string& name, const std::string& type) {
+bool HasField(std::string_view bytes, const std::string& name, const std::string& type) {
   return bytes.find(name + '\0' + type + '\0') != std::string::npos;
 }
 
@@ -103,7 +103,7 @@ TEST(Exr, InfiniteDepthSurvivesEveryCompression) {
     for (int compression = 0; compression <= static_cast<int>(ExrCompression::kDwab);
          ++compression) {
       const auto encoded = EncodeImage(
-          image, ImageKind::kDepth, LightQuantity::kTransmittance,
+          std::make_shared<const Image>(image), ImageKind::kDepth, LightQuantity::kTransmittance,
           {.format = format, .compression = static_cast<ExrCompression>(compression)}, {});
       const auto parts = DecodeExr(encoded);
       ASSERT_EQ(parts.size(), 1U);
@@ -118,7 +118,7 @@ TEST(Exr, EveryCompressionIsTheOneAskedFor) {
   constexpr size_t kSample = (20 * 40 + 20) * 4 + 1;
   for (size_t i = 0; i < names.size(); ++i) {
     const auto parts = DecodeExr(EncodeImage(
-        image, ImageKind::kBeauty, LightQuantity::kTransmittance,
+        std::make_shared<const Image>(image), ImageKind::kBeauty, LightQuantity::kTransmittance,
         {.format = ImageFormat::kExrHalf, .compression = static_cast<ExrCompression>(i)}, {}));
     ASSERT_EQ(parts.size(), 1U);
     EXPECT_EQ(parts[0].texts.at("compression"), names[i]);
@@ -128,9 +128,10 @@ TEST(Exr, EveryCompressionIsTheOneAskedFor) {
 
 TEST(Exr, SingleChannelsAreNeverLossy) {
   for (const ExrCompression compression : {ExrCompression::kDwaa, ExrCompression::kDwab}) {
-    const auto parts = DecodeExr(EncodeImage(
-        MakeImage(1, 1, {"Y"}, {0.3F}), ImageKind::kLightBuffer, LightQuantity::kTransmittance,
-        {.format = ImageFormat::kExrFloat, .compression = compression}, {}));
+    const auto parts =
+        DecodeExr(EncodeImage(std::make_shared<const Image>(MakeImage(1, 1, {"Y"}, {0.3F})),
+                              ImageKind::kLightBuffer, LightQuantity::kTransmittance,
+                              {.format = ImageFormat::kExrFloat, .compression = compression}, {}));
     ASSERT_EQ(parts.size(), 1U);
     EXPECT_EQ(parts[0].texts.at("compression"), "zip");
     EXPECT_THAT(parts[0].values, testing::ElementsAre(0.3F));
@@ -144,15 +145,15 @@ TEST(Exr, WritesStandardAttributesUnderTheirNamesAndTypes) {
                           LightQuantity::kTransmittance, metadata);
   ASSERT_TRUE(eye.ok()) << eye.status();
   EXPECT_STREQ(eye->media_type, "image/x-exr");
-  EXPECT_TRUE(HasField(eye->bytes, "worldToCamera", "m44f"));
-  EXPECT_TRUE(HasField(eye->bytes, "worldToNDC", "m44f"));
-  EXPECT_TRUE(HasField(eye->bytes, "chromaticities", "chromaticities"));
-  EXPECT_TRUE(HasField(eye->bytes, "halflight:technique", "string"));
-  EXPECT_FALSE(HasField(eye->bytes, "halflight:worldToLightTexture", "m44f"));
+  EXPECT_TRUE(HasField(eye->bytes.view(), "worldToCamera", "m44f"));
+  EXPECT_TRUE(HasField(eye->bytes.view(), "worldToNDC", "m44f"));
+  EXPECT_TRUE(HasField(eye->bytes.view(), "chromaticities", "chromaticities"));
+  EXPECT_TRUE(HasField(eye->bytes.view(), "halflight:technique", "string"));
+  EXPECT_FALSE(HasField(eye->bytes.view(), "halflight:worldToLightTexture", "m44f"));
   const auto light = Encode(MakeImage(1, 1, {"Y"}, {1.0F}), ImageKind::kLightBuffer,
                             ImageFormat::kExrHalf, LightQuantity::kTransmittance, metadata);
   ASSERT_TRUE(light.ok()) << light.status();
-  EXPECT_TRUE(HasField(light->bytes, "halflight:worldToLightTexture", "m44f"));
+  EXPECT_TRUE(HasField(light->bytes.view(), "halflight:worldToLightTexture", "m44f"));
 }
 
 TEST(Exr, MatricesTakeAWorldPointToItsPixelAsRowVectors) {

@@ -24,7 +24,8 @@ double ClosedFormSrgb(double linear) {
 
 DecodedPart DecodePng(const absl::StatusOr<EncodedImage>& encoded) {
   EXPECT_TRUE(encoded.ok()) << encoded.status();
-  std::vector<DecodedPart> parts = Decode(encoded.ok() ? encoded->bytes : "", "png");
+  std::vector<DecodedPart> parts =
+      Decode(encoded.ok() ? std::string(encoded->bytes.view()) : "", "png");
   EXPECT_EQ(parts.size(), 1U);
   return parts.empty() ? DecodedPart{} : parts.front();
 }
@@ -158,7 +159,7 @@ TEST(Png, CarriesTextAndNoTime) {
   const DecodedPart png = DecodePng(encoded);
   EXPECT_EQ(png.texts.at("halflight:technique"), "half_angle");
   EXPECT_EQ(png.texts.at("halflight:slices"), "128");
-  EXPECT_EQ(encoded->bytes.find("tIME"), std::string::npos);
+  EXPECT_EQ(encoded->bytes.view().find("tIME"), std::string::npos);
   EXPECT_STREQ(encoded->media_type, "image/png");
 }
 

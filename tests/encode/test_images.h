@@ -2,6 +2,7 @@
 // Holds no expectations of its own.
 #pragma once
 
+#include <memory>
 #include <string>
 #include <utility>
 #include <vector>
@@ -32,7 +33,8 @@ inline Image MakeBeauty(int width, int height) {
 inline absl::StatusOr<EncodedImage> Encode(const Image& image, ImageKind kind, ImageFormat format,
                                            LightQuantity quantity = LightQuantity::kTransmittance,
                                            const ImageMetadata& metadata = {}) {
-  return EncodeImage(image, kind, quantity, {.format = format}, metadata);
+  return EncodeImage(std::make_shared<const Image>(image), kind, quantity, {.format = format},
+                     metadata);
 }
 
 }  // namespace halflight

@@ -119,9 +119,9 @@ TEST(ConvertMeasurement, AndBackTellsTheErrorAndWhatWasCompared) {
   MadeFrame frame;
   frame.rendered.images = {FakeImage(job.request.scene, job.request.images[0], 0)};
   frame.error = error;
-  const v1::FrameHeader header =
-      DescribeFrame(job, frame, {{.bytes = "abc", .media_type = "image/png", .white_black = {}}},
-                    DeviceInfo{}, "1");
+  const v1::FrameHeader header = DescribeFrame(
+      job, frame, {{.bytes = SharedBytes("abc"), .media_type = "image/png", .white_black = {}}},
+      DeviceInfo{}, "1");
   const v1::MeasuredError& told = header.error();
   EXPECT_EQ(told.compared(), v1::COMPARED_FRAME_WITHOUT_SCATTERING);
   EXPECT_EQ(told.covered_pixels(), 2000U);

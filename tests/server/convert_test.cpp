@@ -256,9 +256,9 @@ TEST(DescribeFrame, TellsSettingsAsUsedAndTheMatricesOfTheWholeImage) {
   frame.rendered.clamped_opacities = 3;
   frame.rendered.timings = {{"encode", 2.5}};
   const DeviceInfo device{.gl_renderer = "fake", .gl_version = "4.5"};
-  const v1::FrameHeader header =
-      DescribeFrame(job, frame, {{.bytes = "abc", .media_type = "image/png", .white_black = {}}},
-                    device, "1.2.3");
+  const v1::FrameHeader header = DescribeFrame(
+      job, frame, {{.bytes = SharedBytes("abc"), .media_type = "image/png", .white_black = {}}},
+      device, "1.2.3");
 
   EXPECT_EQ(header.metadata().request_id(), "shot 7");
   EXPECT_EQ(header.metadata().shadow().slices(), 128U);

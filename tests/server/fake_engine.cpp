@@ -168,14 +168,16 @@ FrameJob MustConvert(const v1::RenderFrameRequest& request, const ServerLimits& 
   return *ConvertRequest(request, store, limits, {});
 }
 
-absl::StatusOr<EncodedImage> EncodePlain(const Image& image, ImageKind /*kind*/,
+std::string BytesOf(const Image& image) {
+  return {reinterpret_cast<const char*>(image.pixels.data()), image.pixels.size() * sizeof(float)};
+}
+
+absl::StatusOr<EncodedImage> EncodePlain(const SharedImage& image, ImageKind /*kind*/,
                                          LightQuantity /*quantity*/,
                                          const EncodeSettings& /*settings*/,
                                          const ImageMetadata& /*metadata*/) {
-  EncodedImage encoded{.bytes = {}, .media_type = "test/plain", .white_black = {}};
-  encoded.bytes.assign(reinterpret_cast<const char*>(image.pixels.data()),
-                       image.pixels.size() * sizeof(float));
-  return encoded;
+  return EncodedImage{
+      .bytes = SharedBytes(BytesOf(*image)), .media_type = "test/plain", .white_black = {}};
 }
 
 }  // namespace halflight::testing

@@ -84,8 +84,10 @@ FrameJob MustConvert(const v1::RenderFrameRequest& request = MakeRequest(),
                      const ServerLimits& limits = {});
 
 // Stands in for EncodeImage: the image's floats as they lie in memory.
-absl::StatusOr<EncodedImage> EncodePlain(const Image& image, ImageKind kind, LightQuantity quantity,
-                                         const EncodeSettings& settings,
+// The pixels as they are.
+std::string BytesOf(const Image& image);
+absl::StatusOr<EncodedImage> EncodePlain(const SharedImage& image, ImageKind kind,
+                                         LightQuantity quantity, const EncodeSettings& settings,
                                          const ImageMetadata& metadata);
 
 }  // namespace halflight::testing

@@ -21,6 +21,7 @@
 namespace halflight {
 namespace {
 
+using testing::BytesOf;
 using testing::EncodePlain;
 using testing::FakeImage;
 using ::testing::HasSubstr;
@@ -150,8 +151,8 @@ TEST_F(Measurement, OutputOfTheErrorHoldsFrameMinusModel) {
   }
   const EncodedFrame& frame = **result;
   ASSERT_EQ(frame.outputs.size(), 2U);
-  EXPECT_EQ(frame.outputs[0], EncodePlain(beauty, {}, {}, {ImageFormat::kPng8}, {})->bytes);
-  EXPECT_EQ(frame.outputs[1], EncodePlain(expected, {}, {}, {ImageFormat::kPng8}, {})->bytes);
+  EXPECT_EQ(frame.outputs[0].view(), BytesOf(beauty));
+  EXPECT_EQ(frame.outputs[1].view(), BytesOf(expected));
   EXPECT_EQ(frame.header.outputs(1).channels_size(), 3);
   // The model is known everywhere, so nothing is left to chance.
   const v1::MeasuredError& error = frame.header.error();
@@ -177,7 +178,7 @@ TEST_F(Measurement, BesideAnOutputOfTheErrorEvaluatesTheModelOnce) {
 TEST_F(Measurement, FailureIsTheFramesWithItsReason) {
   std::atomic<int> encoded = 0;
   Start({.encode =
-             [&](const Image& image, ImageKind kind, LightQuantity quantity,
+             [&](const SharedImage& image, ImageKind kind, LightQuantity quantity,
                  const EncodeSettings& settings, const ImageMetadata& metadata) {
                ++encoded;
                return EncodePlain(image, kind, quantity, settings, metadata);

@@ -17,6 +17,7 @@
 namespace halflight {
 namespace {
 
+using testing::BytesOf;
 using testing::EncodePlain;
 using testing::FakeImage;
 using ::testing::HasSubstr;
@@ -40,7 +41,7 @@ TEST_F(Pipeline, FrameHoldsEveryOutputInOrder) {
   ASSERT_EQ(frame.outputs.size(), 3U);
   for (size_t i = 0; i < 3; ++i) {
     const Image image = FakeImage(job.request.scene, job.request.images[i], i);
-    EXPECT_EQ(frame.outputs[i], EncodePlain(image, {}, {}, {ImageFormat::kPng8}, {})->bytes);
+    EXPECT_EQ(frame.outputs[i].view(), BytesOf(image));
   }
   EXPECT_EQ(frame.header.metadata().server_version(), "1.2.3");
   EXPECT_EQ(frame.header.metadata().gl_renderer(), "fake");
@@ -58,6 +59,26 @@ TEST_F(Pipeline, MakesRequestIdsThatDiffer) {
   EXPECT_NE((*first)->header.metadata().request_id(), (*second)->header.metadata().request_id());
 }
 
+TEST_F(Pipeline, RawOutputsOfOneImageAreHeldOnceAndOnlyByTheFrame) {
+  Start({});
+  v1::RenderFrameRequest request = MakeRequest();
+  request.mutable_outputs(0)->set_format(v1::IMAGE_FORMAT_RAW_FLOAT);
+  *request.add_outputs() = request.outputs(0);
+  const FrameJob job = MustConvert(request);
+  Result result = Submit(job).get();
+  ASSERT_TRUE(result.ok()) << result.status();
+  const Image image = FakeImage(job.request.scene, job.request.images[0], 0);
+  const std::vector<SharedBytes>& outputs = (*result)->outputs;
+  ASSERT_EQ(outputs.size(), 2U);
+  EXPECT_EQ(outputs[0].view(), BytesOf(image));
+  EXPECT_EQ(outputs[0].view().data(), outputs[1].view().data());
+  EXPECT_EQ((*result)->header.outputs(1).byte_size(), outputs[1].size());
+  const std::weak_ptr<const void> pixels = outputs[0].owner();
+  ASSERT_TRUE(WaitFor([&] { return result->use_count() == 1; })) << "the pipeline keeps the frame";
+  result = nullptr;
+  EXPECT_TRUE(pixels.expired());
+}
+
 TEST_F(Pipeline, EngineErrorsArriveAsTheyAre) {
   Start({.encode = EncodePlain});
   engine_.FailWith(absl::InvalidArgumentError("scene.lighting: nonsense"));
@@ -67,7 +88,7 @@ TEST_F(Pipeline, EngineErrorsArriveAsTheyAre) {
 }
 
 TEST_F(Pipeline, EncodingErrorsNameTheOutput) {
-  Start({.encode = [](const Image& image, ImageKind kind, LightQuantity quantity,
+  Start({.encode = [](const SharedImage& image, ImageKind kind, LightQuantity quantity,
                       const EncodeSettings& settings,
                       const ImageMetadata& metadata) -> absl::StatusOr<EncodedImage> {
     if (kind == ImageKind::kDepth) {
@@ -100,7 +121,7 @@ TEST_F(Pipeline, FramesThatWaitForTheEncoderCountAsQueued) {
   std::promise<void> release;
   Start({.max_queued_frames = 1,
          .encode = [held = release.get_future().share()](
-                       const Image& image, ImageKind kind, LightQuantity quantity,
+                       const SharedImage& image, ImageKind kind, LightQuantity quantity,
                        const EncodeSettings& settings, const ImageMetadata& metadata) {
            held.wait();
            return EncodePlain(image, kind, quantity, settings, metadata);
@@ -116,7 +137,7 @@ TEST_F(Pipeline, EncodingDoesNotHoldUpRendering) {
   std::promise<void> release;
   Start({.encode_threads = 1,
          .encode = [held = release.get_future().share()](
-                       const Image& image, ImageKind kind, LightQuantity quantity,
+                       const SharedImage& image, ImageKind kind, LightQuantity quantity,
                        const EncodeSettings& settings, const ImageMetadata& metadata) {
            held.wait();
            return EncodePlain(image, kind, quantity, settings, metadata);
@@ -145,7 +166,7 @@ TEST_F(Pipeline, CancelledFrameIsNotEncoded) {
   std::atomic<int> encoded = 0;
   std::stop_source stop;
   Start({.encode_threads = 1,
-         .encode = [&](const Image& image, ImageKind kind, LightQuantity quantity,
+         .encode = [&](const SharedImage& image, ImageKind kind, LightQuantity quantity,
                        const EncodeSettings& settings, const ImageMetadata& metadata) {
            ++encoded;
            stop.request_stop();

@@ -365,7 +365,7 @@ TEST_F(Search, IsToldInTheImages) {
   std::mutex mutex;
   std::vector<std::pair<std::string, std::string>> text;
   Start({.encode =
-             [&](const Image& image, ImageKind kind, LightQuantity quantity,
+             [&](const SharedImage& image, ImageKind kind, LightQuantity quantity,
                  const EncodeSettings& settings, const ImageMetadata& metadata) {
                const std::lock_guard lock(mutex);
                text = metadata.text;

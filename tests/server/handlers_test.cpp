@@ -36,7 +36,11 @@ using testing::WaitFor;
 template <typename Response>
 class FakeSink : public DuplexSink<Response> {
  public:
-  void Write(const Response& message) override {
+  void Write(const OutgoingMessage<Response>& outgoing) override {
+    Response message = outgoing.message;
+    if (message.has_chunk()) {
+      message.mutable_chunk()->set_data(std::string(outgoing.chunk_data.view()));
+    }
     const std::lock_guard lock(mutex_);
     EXPECT_FALSE(finished_.has_value()) << "a write after Finish";
     EXPECT_FALSE(writing_) << "a write while another is under way";
@@ -385,6 +389,20 @@ TEST_F(Sequence, ErrorNamesItsFrameAfterAllFramesBeforeIt) {
   EXPECT_THAT(std::string(sink_.finished()->message()),
               StartsWith("frame 2: scene.shadow.slices: 4000000000"));
   EXPECT_EQ(Ids().size(), 2U);
+  EXPECT_TRUE(sink_.written().back().has_trailer());
+}
+
+TEST_F(Sequence, UnreadableRequestEndsTheStreamAfterTheFramesBeforeIt) {
+  handler_->Start();
+  handler_->OnRequest(Wrap(MakeRequest()));
+  ASSERT_TRUE(WaitFor([&] { return sink_.reads() == 2; }));
+  handler_->OnUnreadableRequest();
+  while (sink_.WaitForWrite()) {
+    handler_->OnWritten(true);
+  }
+  EXPECT_EQ(sink_.finished()->code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_THAT(std::string(sink_.finished()->message()), StartsWith("frame 1: the message is not"));
+  ASSERT_FALSE(sink_.written().empty());
   EXPECT_TRUE(sink_.written().back().has_trailer());
 }
 

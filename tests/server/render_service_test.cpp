@@ -47,6 +47,36 @@ class Service : public ::testing::Test {
     return request;
   }
 
+  static constexpr const char* kMalformed = "\x0a\xff not a message";
+
+  // Sends messages as they are, and returns how the call ends.
+  grpc::Status Send(const std::string& rpc, const std::vector<std::string>& messages) {
+    grpc::GenericStub generic(channel_);
+    grpc::CompletionQueue queue;
+    grpc::ClientContext context;
+    auto call = generic.PrepareCall(&context, "/halflight.v1.RenderService/" + rpc, &queue);
+    const auto wait = [&queue] {
+      void* tag = nullptr;
+      bool ok = false;
+      queue.Next(&tag, &ok);
+    };
+    call->StartCall(nullptr);
+    wait();
+    for (const std::string& bytes : messages) {
+      const grpc::Slice slice(bytes);
+      call->Write(grpc::ByteBuffer(&slice, 1), nullptr);
+      wait();
+    }
+    if (rpc == "RenderFrame") {
+      call->WritesDone(nullptr);
+      wait();
+    }
+    grpc::Status status;
+    call->Finish(&status, nullptr);
+    wait();
+    return status;
+  }
+
   grpc::Status RenderAll(const v1::RenderFrameRequest& request) {
     grpc::ClientContext context;
     auto reader = stub_->RenderFrame(&context, request);
@@ -237,29 +267,19 @@ TEST_F(Service, UploadWithAMalformedMessageCommitsNothing) {
   v1::UploadParticlesRequest chunk;
   chunk.set_chunk(particles.payload());
 
-  grpc::GenericStub generic(channel_);
-  grpc::CompletionQueue queue;
-  grpc::ClientContext context;
-  auto call = generic.PrepareCall(&context, "/halflight.v1.RenderService/UploadParticles", &queue);
-  const auto wait = [&queue] {
-    void* tag = nullptr;
-    bool ok = false;
-    queue.Next(&tag, &ok);
-    return ok;
-  };
-  call->StartCall(nullptr);
-  wait();
-  for (const std::string& bytes : {header.SerializeAsString(), chunk.SerializeAsString(),
-                                   std::string("\x0a\xff not a message")}) {
-    const grpc::Slice slice(bytes);
-    call->Write(grpc::ByteBuffer(&slice, 1), nullptr);
-    wait();
-  }
-  grpc::Status status;
-  call->Finish(&status, nullptr);
-  wait();
-  EXPECT_FALSE(status.ok());
+  EXPECT_FALSE(
+      Send("UploadParticles", {header.SerializeAsString(), chunk.SerializeAsString(), kMalformed})
+          .ok());
   EXPECT_FALSE(store_.Touch(sha256));
+}
+
+TEST_F(Service, MalformedRequestsForFramesAreRefused) {
+  const grpc::Status of_frame = Send("RenderFrame", {kMalformed});
+  EXPECT_EQ(of_frame.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
+  EXPECT_EQ(of_frame.error_message(), "the message is not a RenderFrameRequest");
+  const grpc::Status of_sequence = Send("RenderSequence", {kMalformed});
+  EXPECT_EQ(of_sequence.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
+  EXPECT_EQ(of_sequence.error_message(), "frame 0: the message is not a RenderSequenceRequest");
 }
 
 TEST_F(Service, InvalidRequestNamesTheField) {
