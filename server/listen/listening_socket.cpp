@@ -27,11 +27,11 @@ namespace {
 constexpr int kBacklog = 4096;
 
 union SocketName {
+  sockaddr_storage storage;  // first, so that {} clears all of it
   sockaddr any;
   sockaddr_in v4;
   sockaddr_in6 v6;
   sockaddr_un path;
-  sockaddr_storage storage;
 };
 
 absl::Status CannotListen(const std::string& address, int error) {

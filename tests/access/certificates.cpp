@@ -1,6 +1,7 @@
 #include "tests/access/certificates.h"
 
 #include <atomic>
+#include <cstring>
 
 #include <gtest/gtest.h>
 #include <openssl/bio.h>

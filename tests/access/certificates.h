@@ -5,8 +5,6 @@
 #include <string>
 #include <vector>
 
-#include <openssl/types.h>
-
 namespace halflight::testing {
 
 // A certificate and its key, PEM.

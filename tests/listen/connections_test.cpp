@@ -232,9 +232,9 @@ TEST(Connections, StrangersCannotMakeThreadsByAskingForReflection) {
   const auto inside = NewChannel(server.Address());
   ASSERT_EQ(Health(inside), kServing);
   const size_t threads = server.Count("task");
-  std::vector<std::unique_ptr<grpc::GenericClientAsyncReaderWriter>> streams;
-  std::vector<std::unique_ptr<grpc::ClientContext>> contexts;
   grpc::CompletionQueue queue;
+  std::vector<std::unique_ptr<grpc::ClientContext>> contexts;
+  std::vector<std::unique_ptr<grpc::GenericClientAsyncReaderWriter>> streams;
   grpc::GenericStub stub(NewChannel(server.Address()));
   for (int i = 0; i < 90; ++i) {
     contexts.push_back(std::make_unique<grpc::ClientContext>());
