@@ -35,6 +35,10 @@ struct ServerLimits {
   uint32_t max_partial_uploads = 64;
   uint32_t partial_upload_seconds = 600;
   uint64_t max_cache_dir_bytes = 16 * kGiB;  // 0: there is no cache directory
+  uint32_t max_connections = 4096;
+  uint32_t max_connection_streams = 100;
+  uint32_t max_handshake_seconds = 10;
+  uint32_t max_idle_seconds = 3600;
 };
 
 inline constexpr uint32_t kMinLightBufferSize = 16;

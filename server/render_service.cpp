@@ -38,21 +38,31 @@ struct CallCount {
   std::atomic<bool> draining = false;
 };
 
-// One call under way. Counted before draining is looked at, so that whoever drains and then sees no
-// calls can be sure that none slips in.
+// One call under way, and whose it is. Counted before draining is looked at, so that whoever drains
+// and then sees no calls can be sure that none slips in.
 class CallToken {
  public:
-  CallToken(CallCount& count, const ServerLimits& limits) : count_(count) {
+  CallToken(CallCount& count, const ServerLimits& limits, const Access& access,
+            const CallbackServerContext& context)
+      : count_(count) {
     ++count_.begun;
     if (++count_.active > static_cast<int64_t>(limits.max_calls)) {
       refusal_ = BusyError(v1::ERROR_REASON_TOO_MANY_CALLS,
                            fmt::format("{} calls are under way, allowed: at most {}: retry later",
                                        count_.active - 1, limits.max_calls));
+      return;
     }
     if (count_.draining) {
       refusal_ = WithReason(
           absl::UnavailableError("the server is shutting down: retry elsewhere or later"),
           v1::ERROR_REASON_DRAINING);
+      return;
+    }
+    auto caller = access.Identify(context);
+    if (caller.ok()) {
+      caller_ = *std::move(caller);
+    } else {
+      refusal_ = WithReason(caller.status(), v1::ERROR_REASON_UNAUTHENTICATED);
     }
   }
   ~CallToken() { --count_.active; }
@@ -63,17 +73,22 @@ class CallToken {
 
   // Why the call is not served, or OK.
   [[nodiscard]] const absl::Status& refusal() const { return refusal_; }
+  // Nobody where it is refused.
+  [[nodiscard]] const Caller& caller() const { return caller_; }
 
  private:
   CallCount& count_;
   absl::Status refusal_;
+  Caller caller_;
 };
 
 // What all calls of a service share.
 struct Shared {
-  explicit Shared(const Backend& of) : backend(of) {}
+  Shared(const Backend& the_backend, const Access& the_access)
+      : backend(the_backend), access(the_access) {}
 
   const Backend backend;
+  const Access& access;
   CallCount count;
   Timer timer;
 };
@@ -82,12 +97,10 @@ std::chrono::seconds StallLimit(const Backend& backend) {
   return std::chrono::seconds(backend.limits.max_stall_seconds);
 }
 
-Caller CallerOf(const CallbackServerContext& context) { return {"", context.peer()}; }
-
 class UploadCall final : public grpc::ServerReadReactor<v1::UploadParticlesRequest> {
  public:
   UploadCall(Shared& shared, CallbackServerContext& context, v1::UploadParticlesResponse& response)
-      : token_(shared.count, shared.backend.limits),
+      : token_(shared.count, shared.backend.limits, shared.access, context),
         context_(context),
         response_(response),
         handler_(shared.backend),
@@ -147,10 +160,10 @@ class RenderFrameCall final : public grpc::ServerWriteReactor<grpc::ByteBuffer>,
 
  public:
   RenderFrameCall(Shared& shared, CallbackServerContext& context, const grpc::ByteBuffer& request)
-      : token_(shared.count, shared.backend.limits),
+      : token_(shared.count, shared.backend.limits, shared.access, context),
         context_(context),
         stall_(shared.timer, StallLimit(shared.backend), context),
-        handler_(std::make_shared<RenderFrameHandler>(shared.backend, *this, CallerOf(context))) {
+        handler_(std::make_shared<RenderFrameHandler>(shared.backend, *this, token_.caller())) {
     if (v1::RenderFrameRequest message; !token_.refusal().ok()) {
       RenderFrameCall::Finish(token_.refusal());
     } else if (!Parse(request, message)) {
@@ -189,11 +202,10 @@ class RenderSequenceCall final : public grpc::ServerBidiReactor<grpc::ByteBuffer
 
  public:
   RenderSequenceCall(Shared& shared, CallbackServerContext& context)
-      : token_(shared.count, shared.backend.limits),
+      : token_(shared.count, shared.backend.limits, shared.access, context),
         context_(context),
         stall_(shared.timer, StallLimit(shared.backend), context),
-        handler_(
-            std::make_shared<RenderSequenceHandler>(shared.backend, *this, CallerOf(context))) {
+        handler_(std::make_shared<RenderSequenceHandler>(shared.backend, *this, token_.caller())) {
     if (!token_.refusal().ok()) {
       RenderSequenceCall::Finish(token_.refusal());
     } else {
@@ -244,7 +256,7 @@ using CallbackService = Rpcs::WithCallbackMethod_GetServerInfo<
 
 class RenderService::Calls final : public CallbackService {
  public:
-  explicit Calls(const Backend& backend) : shared_(backend) {}
+  Calls(const Backend& backend, const Access& access) : shared_(backend, access) {}
 
   CallCount& count() { return shared_.count; }
 
@@ -267,7 +279,7 @@ class RenderService::Calls final : public CallbackService {
                                         const v1::QueryUploadRequest* request,
                                         v1::QueryUploadResponse* response) override {
     return AnswerAtOnce(*context, *response,
-                        [&] { return halflight::QueryUpload(backend_, *request); });
+                        [&] { return halflight::QueryUpload(shared_.backend, *request); });
   }
 
   grpc::ServerReadReactor<v1::UploadParticlesRequest>* UploadParticles(
@@ -289,7 +301,7 @@ class RenderService::Calls final : public CallbackService {
   template <typename Response, typename Handler>
   grpc::ServerUnaryReactor* AnswerAtOnce(CallbackServerContext& context, Response& response,
                                          const Handler& handler) {
-    const CallToken token(shared_.count, shared_.backend.limits);
+    const CallToken token(shared_.count, shared_.backend.limits, shared_.access, context);
     absl::Status status = token.refusal();
     if (status.ok()) {
       auto answer = handler();
@@ -306,7 +318,8 @@ class RenderService::Calls final : public CallbackService {
   Shared shared_;
 };
 
-RenderService::RenderService(const Backend& backend) : calls_(std::make_unique<Calls>(backend)) {}
+RenderService::RenderService(const Backend& backend, const Access& access)
+    : calls_(std::make_unique<Calls>(backend, access)) {}
 
 RenderService::~RenderService() = default;
 

@@ -137,11 +137,11 @@ ShadowSettings ConvertShadow(const v1::Shadow& shadow, const ServerLimits& limit
   converted.compositor = FromProto(kCompositors, shadow.compositor(), converted.compositor,
                                    path + ".compositor", checks);
   converted.max_light_buffer_size = static_cast<int>(limits.max_light_buffer_size);
-  converted.light_buffer_size = static_cast<int>(
-      checks.InRangeOr(path + ".light_buffer_size", shadow.light_buffer_size(), 0U,
-                       {.low = static_cast<double>(kMinLightBufferSize),
-                        .high = static_cast<double>(limits.max_light_buffer_size),
-                        .server_limit = true}));
+  converted.light_buffer_size =
+      static_cast<int>(checks.InRangeOr(path + ".light_buffer_size", shadow.light_buffer_size(), 0U,
+                                        {.low = static_cast<double>(kMinLightBufferSize),
+                                         .high = static_cast<double>(limits.max_light_buffer_size),
+                                         .server_limit = true}));
   if (shadow.has_fit_degree()) {
     converted.fit_degree =
         static_cast<int>(checks.InRange(path + ".fit_degree", shadow.fit_degree(),

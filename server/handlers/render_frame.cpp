@@ -24,7 +24,7 @@ void RenderFrameHandler::Begin(const v1::RenderFrameRequest& request) {
   const absl::Status status =
       stop_.stop_requested() ? absl::CancelledError("the call was cancelled") : Submit(request);
   if (!status.ok()) {
-    spdlog::info(RefusalLogLine(request.request_id(), status));
+    spdlog::info(RefusalLogLine(request.request_id(), caller_, status));
     sink_.Finish(status);
   }
 }

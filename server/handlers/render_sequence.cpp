@@ -42,6 +42,7 @@ void RenderSequenceHandler::Take(absl::StatusOr<FrameJob> job, const std::string
     if (job.ok()) {
       job->caller = caller_;
       waiting_ = *std::move(job);
+      waiting_->caller = caller_;
       may_submit_ = true;
     } else {
       Refuse(*slots_.back(), request_id, job.status());
@@ -53,7 +54,7 @@ void RenderSequenceHandler::Take(absl::StatusOr<FrameJob> job, const std::string
 // Under the mutex. The stream ends with this frame.
 void RenderSequenceHandler::Refuse(Slot& slot, const std::string& request_id,
                                    const absl::Status& status) {
-  spdlog::info(RefusalLogLine(request_id, status));
+  spdlog::info(RefusalLogLine(request_id, caller_, status));
   slot.result = status;
   requests_ended_ = true;
 }
