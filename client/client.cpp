@@ -9,6 +9,7 @@
 #include "client/frame_calls.h"
 #include "client/frame_reader.h"
 #include "client/readers/text.h"
+#include "client/security.h"
 #include "client/status_text.h"
 #include "halflight/sha256.h"
 
@@ -49,13 +50,18 @@ std::optional<std::chrono::milliseconds> RetryHint(const grpc::ClientContext& co
   return ms && *ms < 3600000 ? std::optional(std::chrono::milliseconds(*ms)) : std::nullopt;
 }
 
-void SetRoute(grpc::ClientContext& context, std::string_view route) {
+void SetMetadata(grpc::ClientContext& context, std::string_view route, const std::string& token) {
   if (!route.empty()) {
     context.AddMetadata("halflight-particle-sha256", ToHex(route));
   }
+  if (!token.empty()) {
+    context.AddMetadata("authorization", "Bearer " + token);
+  }
 }
 
-Client::Impl::Impl(const std::string& address, ClientOptions options)
+Client::Impl::Impl(const std::string& address,
+                   const std::shared_ptr<grpc::ChannelCredentials>& credentials,
+                   ClientOptions options)
     : address_(address), options_(std::move(options)) {
   grpc::ChannelArguments arguments;
   arguments.SetMaxReceiveMessageSize(kMaxReceivedBytes);
@@ -67,7 +73,7 @@ Client::Impl::Impl(const std::string& address, ClientOptions options)
   // Despite its name, how long one attempt to connect may take.
   arguments.SetInt(GRPC_ARG_MIN_RECONNECT_BACKOFF_MS, 10000);
   arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
-  channel_ = grpc::CreateCustomChannel(address, grpc::InsecureChannelCredentials(), arguments);
+  channel_ = grpc::CreateCustomChannel(address, credentials, arguments);
   stub_ = v1::RenderService::NewStub(channel_);
 }
 
@@ -97,7 +103,7 @@ absl::Status Client::Impl::Try(std::string_view route, const std::stop_token& st
     if (has_deadline) {
       context.set_deadline(deadline);
     }
-    SetRoute(context, route);
+    SetMetadata(context, route, options_.security.token);
     absl::Status status;
     {
       const std::stop_callback cancel(stop, [&context] { context.TryCancel(); });
@@ -153,7 +159,25 @@ absl::StatusOr<std::vector<std::string>> Client::Impl::FindMissing(
                                   response.missing_sha256().end());
 }
 
-absl::Status Client::Impl::UploadOnce(grpc::ClientContext& context,
+absl::StatusOr<v1::QueryUploadResponse> Client::Impl::QueryUpload(
+    const grpc::ClientContext& context, const std::string& sha256, std::string_view route,
+    const std::stop_token& stop) {
+  grpc::ClientContext query;
+  query.set_deadline(context.deadline());
+  SetRoute(query, route);
+  const std::stop_callback cancel(stop, [&query] { query.TryCancel(); });
+  v1::QueryUploadRequest request;
+  request.set_sha256(sha256);
+  v1::QueryUploadResponse response;
+  absl::Status status = FromGrpc(stub_->QueryUpload(&query, request, &response));
+  // A server from before uploads could be resumed tells after the header that it has the set.
+  if (!status.ok() && status.code() != absl::StatusCode::kUnimplemented) {
+    return status;
+  }
+  return response;
+}
+
+absl::Status Client::Impl::UploadFrom(uint64_t offset, grpc::ClientContext& context,
                                       const EncodedParticles& particles) {
   v1::UploadParticlesResponse response;
   const auto writer = stub_->UploadParticles(&context, &response);
@@ -162,12 +186,14 @@ absl::Status Client::Impl::UploadOnce(grpc::ClientContext& context,
   *header.mutable_layout() = particles.layout;
   header.set_byte_size(particles.payload.size());
   header.set_sha256(particles.sha256);
+  header.set_resume_offset(offset);
   bool open = writer->Write(message);
   // A write that fails means that the server has answered already, be it that it has the set.
-  for (size_t at = 0; open && at < particles.payload.size(); at += kUploadChunkBytes) {
-    message.set_chunk(particles.payload.data() + at,
-                      std::min(kUploadChunkBytes, particles.payload.size() - at));
+  for (size_t at = offset; open && at < particles.payload.size(); at += kUploadChunkBytes) {
+    const size_t bytes = std::min(kUploadChunkBytes, particles.payload.size() - at);
+    message.set_chunk(particles.payload.data() + at, bytes);
     open = writer->Write(message);
+    sent_bytes_ += open ? bytes : 0;
   }
   if (open) {
     message.mutable_finish()->set_byte_size(particles.payload.size());
@@ -179,19 +205,27 @@ absl::Status Client::Impl::UploadOnce(grpc::ClientContext& context,
   return FromGrpc(writer->Finish());
 }
 
-absl::Status Client::Impl::Upload(const EncodedParticles& particles, std::string_view route,
-                                  const std::stop_token& stop) {
-  return Try(route, stop,
-             [&](grpc::ClientContext& context) { return UploadOnce(context, particles); });
-}
-
 absl::Status Client::Impl::EnsureUploaded(const EncodedParticles& particles, std::string_view route,
                                           const std::stop_token& stop) {
-  const auto missing = FindMissing({particles.sha256}, route, stop);
-  if (!missing.ok() || missing->empty()) {
-    return missing.status();
-  }
-  return Upload(particles, route, stop);
+  bool from_start = false;
+  return Try(route, stop, [&](grpc::ClientContext& context) -> absl::Status {
+    const auto there = QueryUpload(context, particles.sha256, route, stop);
+    if (!there.ok() || there->complete()) {
+      return there.status();
+    }
+    const uint64_t offset =
+        from_start ? 0 : std::min<uint64_t>(there->committed_bytes(), particles.payload.size());
+    absl::Status status = UploadFrom(offset, context, particles);
+    if (status.ok()) {
+      saved_bytes_ += offset;
+    } else if (offset > 0 && status.code() == absl::StatusCode::kDataLoss) {
+      from_start = true;  // somebody else sent other bytes under this name
+      return absl::UnavailableError(MessageOf(status));
+    } else if (offset > 0 && status.code() == absl::StatusCode::kOutOfRange) {
+      return absl::UnavailableError(MessageOf(status));  // gone since it was asked about
+    }
+    return status;
+  });
 }
 
 absl::StatusOr<RenderedFrame> Client::Impl::RenderOnce(grpc::ClientContext& context,
@@ -260,7 +294,11 @@ absl::StatusOr<Client> Client::Connect(const std::string& address, ClientOptions
   if (absl::Status status = CheckAddress(address); !status.ok()) {
     return status;
   }
-  return Client(std::make_unique<Impl>(address, std::move(options)));
+  const auto credentials = MakeCredentials(address, options.security);
+  if (!credentials.ok()) {
+    return credentials.status();
+  }
+  return Client(std::make_unique<Impl>(address, *credentials, std::move(options)));
 }
 
 bool Client::WaitForConnection(std::chrono::milliseconds time) {
@@ -276,13 +314,11 @@ absl::StatusOr<std::vector<std::string>> Client::FindMissing(
   return impl_->FindMissing(sha256, "", impl_->options().stop);
 }
 
-absl::Status Client::Upload(const EncodedParticles& particles) {
-  return impl_->Upload(particles, particles.sha256, impl_->options().stop);
-}
-
 absl::Status Client::EnsureUploaded(const EncodedParticles& particles) {
   return impl_->EnsureUploaded(particles, particles.sha256, impl_->options().stop);
 }
+
+UploadTotals Client::upload_totals() const { return impl_->upload_totals(); }
 
 absl::StatusOr<RenderedFrame> Client::RenderFrame(v1::RenderFrameRequest request,
                                                   const EncodedParticles* particles) {

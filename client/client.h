@@ -20,6 +20,20 @@
 
 namespace halflight::client {
 
+// How client and server know each other.
+struct Security {
+  // Whether to encrypt, and to believe only a server whose certificate is for the host of its
+  // address. Any of the files below means so too.
+  bool tls = false;
+  std::string ca_file{};    // the authorities to believe, PEM; empty: the system's
+  std::string cert_file{};  // what to show, PEM; with key_file
+  std::string key_file{};
+  // Who calls, where the server wants to know; empty: not said. It is kept out of every message.
+  std::string token{};
+  // Whether the token may also go in plain text to other machines.
+  bool insecure_token = false;
+};
+
 struct ClientOptions {
   // The longest that a call may take, retries included; of a sequence, the longest without a sign
   // of life. 0: for ever.
@@ -30,6 +44,13 @@ struct ClientOptions {
   std::chrono::milliseconds first_backoff{100};
   // When requested, calls end with CANCELLED at once.
   std::stop_token stop;
+  Security security;
+};
+
+// What uploads cost so far, payload bytes.
+struct UploadTotals {
+  uint64_t sent_bytes = 0;   // given to the connection, also of uploads that broke off
+  uint64_t saved_bytes = 0;  // not sent because the server had them of an upload that broke off
 };
 
 // One frame of a sequence, before it is sent.
@@ -50,8 +71,8 @@ using FrameSink = std::function<absl::Status(uint64_t index, RenderedFrame frame
 // only after max_attempts.
 class Client {
  public:
-  // `address` is host:port or unix:path; InvalidArgument for anything else. Does not wait for the
-  // server: the first call does.
+  // `address` is host:port or unix:path; InvalidArgument for anything else, and for security that
+  // cannot be had as it is asked for. Does not wait for the server: the first call does.
   static absl::StatusOr<Client> Connect(const std::string& address, ClientOptions options = {});
   Client(const Client&) = delete;
   Client& operator=(const Client&) = delete;
@@ -67,12 +88,13 @@ class Client {
   // Those of the named sets that the server lacks.
   absl::StatusOr<std::vector<std::string>> FindMissing(const std::vector<std::string>& sha256);
 
-  // Sends a set, whether or not the server has it.
-  absl::Status Upload(const EncodedParticles& particles);
-
-  // Sends a set where the server lacks it. InvalidArgument where it is larger than the server
-  // takes.
+  // Sends a set where the server lacks it, and of it what the server lacks: each try goes on where
+  // an earlier one broke off, be it one of another process. InvalidArgument where it is larger than
+  // the server takes.
   absl::Status EnsureUploaded(const EncodedParticles& particles);
+
+  // Of all uploads by this client, those of sequences included.
+  [[nodiscard]] UploadTotals upload_totals() const;
 
   // Renders one frame. With `particles` they are uploaded first and named in the request; where the
   // server has dropped them in between they are sent once more.

@@ -4,7 +4,7 @@
 
 #include <grpcpp/grpcpp.h>
 
-#include <mutex>
+#include <atomic>
 #include <string>
 #include <string_view>
 
@@ -23,7 +23,8 @@ std::optional<std::chrono::milliseconds> RetryHint(const grpc::ClientContext& co
 
 class Client::Impl {
  public:
-  Impl(const std::string& address, ClientOptions options);
+  Impl(const std::string& address, const std::shared_ptr<grpc::ChannelCredentials>& credentials,
+       ClientOptions options);
 
   bool WaitForConnection(std::chrono::milliseconds time, const std::stop_token& stop);
 
@@ -34,14 +35,13 @@ class Client::Impl {
   absl::StatusOr<std::vector<std::string>> FindMissing(const std::vector<std::string>& sha256,
                                                        std::string_view route,
                                                        const std::stop_token& stop);
-  absl::Status Upload(const EncodedParticles& particles, std::string_view route,
-                      const std::stop_token& stop);
   absl::Status EnsureUploaded(const EncodedParticles& particles, std::string_view route,
                               const std::stop_token& stop);
   absl::StatusOr<RenderedFrame> RenderFrame(const v1::RenderFrameRequest& request);
   absl::Status RenderSequence(uint64_t count, const FrameSource& source, const FrameSink& sink,
                               uint32_t read_ahead);
 
+  [[nodiscard]] UploadTotals upload_totals() const { return {sent_bytes_, saved_bytes_}; }
   [[nodiscard]] const ClientOptions& options() const { return options_; }
 
  private:
@@ -52,7 +52,13 @@ class Client::Impl {
   // Waits between tries; false when `stop` was requested. A connection that is lost comes up again
   // only while somebody waits on its channel: calls on it fail at once, and nothing else drives it.
   bool Pause(std::chrono::milliseconds time, const std::stop_token& stop);
-  absl::Status UploadOnce(grpc::ClientContext& context, const EncodedParticles& particles);
+  // As a part of the try that `context` is of: what the server has of a set.
+  absl::StatusOr<v1::QueryUploadResponse> QueryUpload(const grpc::ClientContext& context,
+                                                      const std::string& sha256,
+                                                      std::string_view route,
+                                                      const std::stop_token& stop);
+  absl::Status UploadFrom(uint64_t offset, grpc::ClientContext& context,
+                          const EncodedParticles& particles);
   absl::StatusOr<RenderedFrame> RenderOnce(grpc::ClientContext& context,
                                            const v1::RenderFrameRequest& request);
 
@@ -60,11 +66,12 @@ class Client::Impl {
   ClientOptions options_;
   std::shared_ptr<grpc::Channel> channel_;
   std::unique_ptr<v1::RenderService::Stub> stub_;
-  std::mutex limits_mutex_;
-  std::optional<v1::ServerLimits> limits_;
+  std::atomic<uint64_t> sent_bytes_ = 0;
+  std::atomic<uint64_t> saved_bytes_ = 0;
 };
 
-// Adds the metadata that names the particle set; nothing for an empty route.
-void SetRoute(grpc::ClientContext& context, std::string_view route);
+// Adds the metadata that names the particle set, and the one that says who calls; nothing for an
+// empty route or token.
+void SetMetadata(grpc::ClientContext& context, std::string_view route, const std::string& token);
 
 }  // namespace halflight::client

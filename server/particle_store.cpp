@@ -3,6 +3,8 @@
 #include <utility>
 #include <vector>
 
+#include "server/particle_files.h"
+
 namespace halflight {
 
 uint64_t MemoryBytes(const ParticleSet& set) {
@@ -11,6 +13,11 @@ uint64_t MemoryBytes(const ParticleSet& set) {
          of(set.velocities) + of(set.emissions);
 }
 
+ParticleStore::ParticleStore(uint64_t max_bytes, std::unique_ptr<ParticleFiles> files)
+    : max_bytes_(max_bytes), files_(std::move(files)) {}
+
+ParticleStore::~ParticleStore() = default;
+
 std::shared_ptr<const ParticleSet> ParticleStore::Find(const std::string& sha256) {
   const std::lock_guard lock(mutex_);
   const auto found = by_name_.find(sha256);
@@ -18,10 +25,43 @@ std::shared_ptr<const ParticleSet> ParticleStore::Find(const std::string& sha256
     return nullptr;
   }
   by_use_.splice(by_use_.begin(), by_use_, found->second);
+  if (files_ != nullptr) {
+    files_->Use(sha256);
+  }
   return found->second->set;
 }
 
+bool ParticleStore::Touch(const std::string& sha256) {
+  return Find(sha256) != nullptr || (files_ != nullptr && files_->Use(sha256));
+}
+
+bool ParticleStore::InMemory(const std::string& sha256) const {
+  const std::lock_guard lock(mutex_);
+  return by_name_.find(sha256) != by_name_.end();
+}
+
+bool ParticleStore::OnDiskOnly(const std::string& sha256) {
+  return files_ != nullptr && !InMemory(sha256) && files_->Use(sha256);
+}
+
+void ParticleStore::Fetch(const std::string& sha256, std::stop_token stop,
+                          std::function<void()> then) {
+  files_->Read(sha256, std::move(stop), [this, sha256, then = std::move(then)](const auto& set) {
+    if (set != nullptr) {
+      Keep(sha256, set);
+    }
+    then();
+  });
+}
+
 void ParticleStore::Insert(const std::string& sha256, std::shared_ptr<const ParticleSet> set) {
+  if (files_ != nullptr) {
+    files_->Write(sha256, set);
+  }
+  Keep(sha256, std::move(set));
+}
+
+void ParticleStore::Keep(const std::string& sha256, std::shared_ptr<const ParticleSet> set) {
   const uint64_t bytes = MemoryBytes(*set);
   if (bytes > max_bytes_) {
     return;
@@ -33,7 +73,7 @@ void ParticleStore::Insert(const std::string& sha256, std::shared_ptr<const Part
     by_use_.splice(by_use_.begin(), by_use_, found->second);
     return;
   }
-  while (bytes_ + bytes > max_bytes_) {
+  while (bytes_ + bytes > max_bytes_ || by_use_.size() >= kMaxSets) {
     Entry& oldest = by_use_.back();
     bytes_ -= oldest.bytes;
     by_name_.erase(oldest.sha256);
@@ -49,5 +89,7 @@ uint64_t ParticleStore::bytes() const {
   const std::lock_guard lock(mutex_);
   return bytes_;
 }
+
+bool ParticleStore::idle() const { return files_ == nullptr || files_->idle(); }
 
 }  // namespace halflight

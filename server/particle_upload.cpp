@@ -1,32 +1,47 @@
 #include "server/particle_upload.h"
 
+#include <algorithm>
 #include <string>
 #include <utility>
 
 #include <fmt/format.h>
 
 #include "server/convert/field_checks.h"
-#include "server/retry_hint.h"
+#include "server/error_detail.h"
 #include "server/status_text.h"
 
 namespace halflight {
 
-ParticleUpload::ParticleUpload(ParticleStore& store, ByteBudget& memory, const ServerLimits& limits)
-    : store_(store), limits_(limits), memory_(memory) {}
+ParticleUpload::ParticleUpload(ParticleStore& store, PartialUploads& partial,
+                               const ServerLimits& limits)
+    : store_(store), partial_(partial), limits_(limits) {}
+
+ParticleUpload::~ParticleUpload() { Keep(); }
 
 absl::Status ParticleUpload::Receive(const v1::UploadParticlesRequest& message) {
-  if (response_.has_value()) {
-    return absl::InvalidArgumentError("part: a message after finish, allowed: end of the stream");
+  absl::Status status = Take(message);
+  if (absl::IsResourceExhausted(status)) {
+    Keep();  // there may be room again when the client comes back
+  }
+  if (!status.ok()) {
+    upload_.reset();
+    over_ = true;
+  }
+  return status;
+}
+
+absl::Status ParticleUpload::Take(const v1::UploadParticlesRequest& message) {
+  if (over_) {
+    return FieldError("part", "a message after finish", "end of the stream");
   }
   using Request = v1::UploadParticlesRequest;
-  const bool begun = assembler_.has_value();
+  const bool begun = upload_ != nullptr;
   if (!begun && message.part_case() != Request::kHeader) {
-    return absl::InvalidArgumentError("part: no header yet, allowed: header first");
+    return FieldError("part", "no header yet", "header first");
   }
   switch (message.part_case()) {
     case Request::kHeader:
-      return begun ? absl::InvalidArgumentError(
-                         "part: a second header, allowed: chunk or finish after the header")
+      return begun ? FieldError("part", "a second header", "chunk or finish after the header")
                    : Begin(message.header());
     case Request::kChunk:
       return Append(message.chunk());
@@ -35,7 +50,7 @@ absl::Status ParticleUpload::Receive(const v1::UploadParticlesRequest& message) 
     case Request::PART_NOT_SET:
       break;
   }
-  return absl::InvalidArgumentError("part: unset, allowed: header, chunk or finish");
+  return FieldError("part", "unset", "header, chunk or finish");
 }
 
 absl::Status ParticleUpload::Begin(const v1::ParticleSetDescription& header) {
@@ -52,54 +67,90 @@ absl::Status ParticleUpload::Begin(const v1::ParticleSetDescription& header) {
                       fmt::format("{} bytes", kSha256Bytes));
   }
   if (store_.Touch(header.sha256())) {
-    response_.emplace().set_already_present(true);
+    AnswerAlreadyPresent();
     return absl::OkStatus();
   }
-  header_ = header;
-  assembler_.emplace(header_.layout(), *bytes);
+  if (header.resume_offset() == 0) {
+    upload_ = std::make_unique<PartialUpload>(header, partial_.memory());
+    return absl::OkStatus();
+  }
+  auto kept = partial_.Take(header);
+  if (!kept.ok()) {
+    return kept.status();
+  }
+  upload_ = *std::move(kept);
+  at_ = header.resume_offset();
   return absl::OkStatus();
 }
 
-absl::Status ParticleUpload::Append(std::string_view bytes) {
-  // An upload never holds more than the payload, whatever is sent: the assembler refuses the rest.
-  if (assembler_->received_bytes() + bytes.size() <= assembler_->payload_bytes() &&
-      !memory_.Grow(bytes.size())) {
-    return BusyError("the memory for uploads in progress is used up: retry later");
+void ParticleUpload::AnswerAlreadyPresent() {
+  response_.emplace().set_already_present(true);
+  upload_.reset();
+  over_ = true;
+}
+
+void ParticleUpload::Keep() {
+  if (upload_ != nullptr) {
+    partial_.Keep(std::move(upload_));
   }
-  return assembler_->Append(bytes);
+}
+
+absl::Status ParticleUpload::Append(std::string_view bytes) {
+  // Another upload of the set may have come to its end.
+  if (store_.Touch(upload_->header.sha256())) {
+    AnswerAlreadyPresent();
+    return absl::OkStatus();
+  }
+  ParticleAssembler& assembler = upload_->assembler;
+  const uint64_t begin = std::exchange(at_, at_ + bytes.size());
+  // What is there already, where the client resumes before the end of what is kept.
+  bytes.remove_prefix(std::min<uint64_t>(bytes.size(), assembler.received_bytes() - begin));
+  // An upload never holds more than the payload, whatever is sent: the assembler refuses the rest.
+  if (assembler.received_bytes() + bytes.size() <= assembler.payload_bytes() &&
+      !partial_.Grow(upload_->memory, bytes.size())) {
+    return BusyError(v1::ERROR_REASON_UPLOAD_MEMORY_FULL,
+                     "the memory for uploads in progress is used up: retry later");
+  }
+  return assembler.Append(bytes);
 }
 
 absl::Status ParticleUpload::Finish(const v1::UploadFinish& finish) {
-  if (finish.byte_size() != header_.byte_size()) {
+  const v1::ParticleSetDescription& header = upload_->header;
+  if (finish.byte_size() != header.byte_size()) {
     return FieldError("finish.byte_size", fmt::format("{}", finish.byte_size()),
-                      fmt::format("{}, as in the header", header_.byte_size()));
+                      fmt::format("{}, as in the header", header.byte_size()));
   }
-  if (finish.sha256() != header_.sha256()) {
+  if (finish.sha256() != header.sha256()) {
     return FieldError("finish.sha256", ToHex(finish.sha256()),
-                      ToHex(header_.sha256()) + ", as in the header");
+                      ToHex(header.sha256()) + ", as in the header");
   }
-  if (assembler_->received_bytes() != header_.byte_size()) {
-    return FieldError("finish", fmt::format("after {} bytes", assembler_->received_bytes()),
-                      fmt::format("after {} bytes, as in the header", header_.byte_size()));
+  if (at_ != header.byte_size()) {
+    return FieldError("finish", fmt::format("after {} bytes", at_),
+                      fmt::format("after {} bytes, as in the header", header.byte_size()));
   }
-  NamedParticles particles = assembler_->Finish();
-  if (particles.sha256 != header_.sha256()) {
-    return absl::DataLossError(fmt::format("header.sha256: {}, but what arrived has {}",
-                                           ToHex(header_.sha256()), ToHex(particles.sha256)));
+  NamedParticles particles = upload_->assembler.Finish();
+  if (particles.sha256 != header.sha256()) {
+    return WithReason(
+        absl::DataLossError(fmt::format("header.sha256: {}, but what arrived has {}",
+                                        ToHex(header.sha256()), ToHex(particles.sha256))),
+        v1::ERROR_REASON_CHECKSUM_MISMATCH);
   }
+  partial_.Drop(particles.sha256);
   store_.Insert(particles.sha256, std::move(particles.set));
-  memory_.Release();
+  upload_.reset();
+  over_ = true;
   response_.emplace();
   return absl::OkStatus();
 }
 
-absl::Status ParticleUpload::AtEndOfStream() const {
+absl::Status ParticleUpload::AtEndOfStream() {
   if (response_.has_value()) {
     return absl::OkStatus();
   }
-  return absl::InvalidArgumentError(
-      "part: the stream ended (or a message could not be read) before finish, allowed: header, "
-      "chunks, finish");
+  Keep();
+  over_ = true;
+  return FieldError("part", "the stream ended (or a message could not be read) before finish",
+                    "header, chunks, finish");
 }
 
 absl::StatusOr<NamedParticles> BuildInlineParticles(const v1::InlineParticles& particles,
@@ -115,7 +166,7 @@ absl::StatusOr<NamedParticles> BuildInlineParticles(const v1::InlineParticles& p
   }
   ParticleAssembler assembler(particles.layout(), *bytes);
   if (const absl::Status status = assembler.Append(particles.payload()); !status.ok()) {
-    return Prefixed(path + ".", status);
+    return Within(path + ".", status);
   }
   return assembler.Finish();
 }

@@ -12,4 +12,7 @@ std::string MessageOf(const absl::Status& status);
 // The same error, hints and all, with its message after `prefix`.
 absl::Status Prefixed(const std::string& prefix, const absl::Status& status);
 
+// The same error, hints and all, under another code.
+absl::Status WithCode(absl::StatusCode code, const absl::Status& status);
+
 }  // namespace halflight

@@ -169,6 +169,11 @@ absl::Status RunRender(const RenderOptions& options, const std::stop_token& stop
   const absl::Status status = job->frames.size() > 1 || !options.frames.empty()
                                   ? RenderFrames(options, *job, connection->client(), taker)
                                   : RenderSingle(*job, connection->client(), taker);
+  const UploadTotals uploads = connection->client().upload_totals();
+  if (uploads.saved_bytes > 0 && !options.quiet && !options.json) {
+    fmt::print("upload resumed: the server had {} bytes already, {} were sent\n",
+               uploads.saved_bytes, uploads.sent_bytes);
+  }
   return status.ok() ? taker.TargetStatus() : status;
 }
 

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <string_view>
 
 #include "halflight/sha256.h"
 #include "halflight/v1/particles.pb.h"
@@ -38,6 +39,13 @@ bool HasAttribute(const v1::ParticleLayout& layout, v1::ParticleAttribute attrib
 
 // Bytes of payload that the layout asks for; none where the product overflows 63 bits.
 std::optional<uint64_t> PayloadBytes(const v1::ParticleLayout& layout);
+
+// What a set's name covers before the payload, as particles.proto defines it.
+inline constexpr size_t kParticlePrefixBytes = 40;
+std::string ParticlePrefix(const v1::ParticleLayout& layout);
+// The layout that has this prefix, its attributes in ascending order; none where the bytes are no
+// prefix. Values are as they come.
+std::optional<v1::ParticleLayout> ParseParticlePrefix(std::string_view prefix);
 
 // A digest that has seen the layout's 40-byte prefix: update it with the payload and finish it to
 // get the set's name.

@@ -4,9 +4,9 @@
 #include <string>
 
 #include "renderer/frame_engine.h"
-#include "server/byte_budget.h"
 #include "server/frame_pipeline.h"
 #include "server/limits.h"
+#include "server/partial_uploads.h"
 #include "server/particle_store.h"
 
 namespace halflight {
@@ -16,7 +16,7 @@ struct Backend {
   const ServerLimits& limits;
   const std::string& server_version;
   ParticleStore& store;
-  ByteBudget& upload_memory;
+  PartialUploads& partial_uploads;
   FramePipeline& pipeline;
 };
 

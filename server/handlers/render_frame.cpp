@@ -1,5 +1,6 @@
 #include "server/handlers/render_frame.h"
 
+#include <string>
 #include <utility>
 
 #include <spdlog/spdlog.h>
@@ -10,8 +11,20 @@
 namespace halflight {
 
 void RenderFrameHandler::Start(const v1::RenderFrameRequest& request) {
-  if (const absl::Status status = Submit(request); !status.ok()) {
-    spdlog::info(RefusalLogLine(request.request_id(), status));
+  const std::string& sha256 = request.scene().particle_sha256();
+  if (backend_.store.OnDiskOnly(sha256)) {
+    backend_.store.Fetch(sha256, stop_.get_token(),
+                         [self = shared_from_this(), request] { self->Begin(request); });
+  } else {
+    Begin(request);
+  }
+}
+
+void RenderFrameHandler::Begin(const v1::RenderFrameRequest& request) {
+  const absl::Status status =
+      stop_.stop_requested() ? absl::CancelledError("the call was cancelled") : Submit(request);
+  if (!status.ok()) {
+    spdlog::info(RefusalLogLine(request.request_id(), caller_, status));
     sink_.Finish(status);
   }
 }
@@ -21,6 +34,7 @@ absl::Status RenderFrameHandler::Submit(const v1::RenderFrameRequest& request) {
   if (!job.ok()) {
     return job.status();
   }
+  job->caller = caller_;
   return backend_.pipeline.Submit(
       *std::move(job), stop_.get_token(),
       [self = shared_from_this()](const auto& frame) { self->OnFrame(frame); });

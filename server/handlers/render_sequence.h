@@ -10,8 +10,10 @@
 #include <optional>
 #include <stop_token>
 #include <string>
+#include <utility>
 
 #include "halflight/v1/service.pb.h"
+#include "server/caller.h"
 #include "server/handlers/backend.h"
 #include "server/handlers/frame_messages.h"
 #include "server/handlers/sequence_state.h"
@@ -23,18 +25,20 @@ namespace halflight {
 // encoder and wire busy at once, and the bound on what a slow reader makes the server hold.
 inline constexpr size_t kFramesAhead = 4;
 
-// Held by the call, and by the pipeline while frames of it are there: the sink has to live only
-// until it is finished.
+// Held by the call, by the store while particles are read for it, and by the pipeline while frames
+// of it are there: the sink has to live only until it is finished.
 //
 // Reads, writes and frames complete on different threads. Each notes what happened under the mutex
 // and calls Advance, which lets one thread at a time do what follows, without the mutex: so the
 // sink is never called by two at once, and never after Finish.
 //
-// A stream never fails because its own frames fill the queue: the next one then waits for them.
+// A stream never fails because its own frames fill the queue, or the memory for frames: the next
+// one then waits until they are sent.
 class RenderSequenceHandler : public std::enable_shared_from_this<RenderSequenceHandler> {
  public:
-  RenderSequenceHandler(const Backend& backend, DuplexSink<v1::RenderSequenceResponse>& sink)
-      : backend_(backend), sink_(sink) {}
+  RenderSequenceHandler(const Backend& backend, DuplexSink<v1::RenderSequenceResponse>& sink,
+                        Caller caller = {})
+      : backend_(backend), sink_(sink), caller_(std::move(caller)) {}
 
   // Once, first.
   void Start() { Advance(); }
@@ -57,10 +61,11 @@ class RenderSequenceHandler : public std::enable_shared_from_this<RenderSequence
 
   enum class Step : uint8_t { kNothing, kSubmit, kRead, kWrite, kFinish };
 
+  // The particles are in memory, or nowhere.
+  void Accept(const v1::RenderSequenceRequest& request);
   void Take(absl::StatusOr<FrameJob> job, const std::string& request_id);
   void Refuse(Slot& slot, const std::string& request_id, const absl::Status& status);
   void Submit();
-  [[nodiscard]] bool HasFramesUnderWay() const;
   void OnFrame(Slot& slot, FrameOrError result);
   void End(const absl::Status& status);
   void Advance();
@@ -68,6 +73,7 @@ class RenderSequenceHandler : public std::enable_shared_from_this<RenderSequence
 
   const Backend backend_;
   DuplexSink<v1::RenderSequenceResponse>& sink_;
+  const Caller caller_;
   std::stop_source stop_;
 
   // Touched only by the thread that completes a read; reads are one at a time.

@@ -77,15 +77,63 @@ TEST_F(ClientTest, DoesNotUploadWhatTheServerHas) {
 }
 
 TEST_F(ClientTest, TriesAgainWhenTheServerIsBusy) {
-  for (const char* rpc : {"FindMissingParticles", "UploadParticles", "RenderFrame"}) {
+  for (const char* rpc : {"QueryUpload", "UploadParticles", "RenderFrame"}) {
     service_.FailNext(rpc, {kUnavailable, kExhausted});
   }
   const EncodedParticles particles = SomeParticles(1);
   const auto frame = Connect().RenderFrame(SomeRequest(), &particles);
   ASSERT_TRUE(frame.ok()) << frame.status();
-  for (const char* rpc : {"FindMissingParticles", "UploadParticles", "RenderFrame"}) {
+  for (const char* rpc : {"QueryUpload", "UploadParticles", "RenderFrame"}) {
     EXPECT_EQ(service_.Calls(rpc), 3) << rpc;
   }
+}
+
+TEST_F(ClientTest, UploadGoesOnWhereItBrokeOff) {
+  constexpr uint64_t kChunk = 262144;
+  service_.break_uploads_at = {2 * kChunk, 3 * kChunk};
+  const EncodedParticles particles = SomeParticles(1, 100000);  // 1,200,000 bytes
+  Client client = Connect();
+  const absl::Status status = client.EnsureUploaded(particles);
+  ASSERT_TRUE(status.ok()) << status;
+  EXPECT_THAT(service_.resume_offsets, ElementsAre(0, 2 * kChunk, 3 * kChunk));
+  EXPECT_EQ(client.upload_totals().saved_bytes, 3 * kChunk);
+  // What is on its way when a stream breaks off is sent in vain.
+  EXPECT_GE(client.upload_totals().sent_bytes, particles.payload.size());
+}
+
+TEST_F(ClientTest, UploadThatAnotherProcessBeganGoesOn) {
+  const EncodedParticles particles = SomeParticles(1, 1000);
+  service_.KeepPartial(particles.sha256, particles.payload.substr(0, 5000));
+  Client client = Connect();
+  ASSERT_TRUE(client.EnsureUploaded(particles).ok());
+  EXPECT_THAT(service_.resume_offsets, ElementsAre(5000));
+  EXPECT_EQ(client.upload_totals().saved_bytes, 5000U);
+  EXPECT_EQ(client.upload_totals().sent_bytes, 7000U);
+}
+
+TEST_F(ClientTest, OtherBytesUnderTheSameNameAreSentAnew) {
+  const EncodedParticles particles = SomeParticles(1, 1000);
+  service_.KeepPartial(particles.sha256, std::string(5000, 'x'));
+  Client client = Connect();
+  const absl::Status status = client.EnsureUploaded(particles);
+  ASSERT_TRUE(status.ok()) << status;
+  EXPECT_THAT(service_.resume_offsets, ElementsAre(5000, 0));
+  EXPECT_EQ(client.upload_totals().saved_bytes, 0U);
+}
+
+TEST_F(ClientTest, UploadsToAServerThatCannotResume) {
+  service_.FailNext("QueryUpload", {{grpc::StatusCode::UNIMPLEMENTED, "no such call"}});
+  ASSERT_TRUE(Connect().EnsureUploaded(SomeParticles(1)).ok());
+  EXPECT_THAT(service_.resume_offsets, ElementsAre(0));
+}
+
+TEST_F(ClientTest, UploadThatKeepsBreakingOffEndsWithTheLastTry) {
+  service_.break_uploads_at = {1, 1, 1, 1};
+  ClientOptions options;
+  options.max_attempts = 3;
+  ExpectError(Connect(options).EnsureUploaded(SomeParticles(1, 200000)), StatusCode::kUnavailable,
+              {"after 3 of 3 tries", "broken off"});
+  EXPECT_EQ(service_.Calls("UploadParticles"), 3);
 }
 
 TEST_F(ClientTest, GivesUpAfterTheLastTry) {

@@ -46,6 +46,11 @@ class FakeService final : public v1::RenderService::Service {
     const std::lock_guard lock(mutex_);
     return calls_[rpc];
   }
+  // The server has these bytes of an upload that broke off.
+  void KeepPartial(const std::string& sha256, const std::string& payload) {
+    const std::lock_guard lock(mutex_);
+    partial_[sha256] = payload;
+  }
   void Evict(const std::string& sha256) {
     const std::lock_guard lock(mutex_);
     sets_.erase(sha256);
@@ -87,6 +92,17 @@ class FakeService final : public v1::RenderService::Service {
     return grpc::Status::OK;
   }
 
+  grpc::Status QueryUpload(grpc::ServerContext* /*context*/, const v1::QueryUploadRequest* request,
+                           v1::QueryUploadResponse* response) override {
+    if (grpc::Status status = Enter("QueryUpload"); !status.ok()) {
+      return status;
+    }
+    const std::lock_guard lock(mutex_);
+    response->set_complete(sets_.count(request->sha256()) != 0);
+    response->set_committed_bytes(partial_[request->sha256()].size());
+    return grpc::Status::OK;
+  }
+
   grpc::Status UploadParticles(grpc::ServerContext* /*context*/,
                                grpc::ServerReader<v1::UploadParticlesRequest>* reader,
                                v1::UploadParticlesResponse* /*response*/) override {
@@ -98,14 +114,27 @@ class FakeService final : public v1::RenderService::Service {
     std::string payload;
     bool finished = false;
     while (!finished && reader->Read(&message)) {
+      const std::lock_guard lock(mutex_);
       if (message.has_header()) {
         header = message.header();
+        resume_offsets.push_back(header.resume_offset());
+        std::string kept = std::move(partial_[header.sha256()]);
+        partial_.erase(header.sha256());
+        if (header.resume_offset() > kept.size()) {
+          return {grpc::StatusCode::OUT_OF_RANGE, "header.resume_offset"};
+        }
+        payload = kept.substr(0, header.resume_offset());
       } else if (message.has_finish()) {
         finished = message.finish().sha256() == header.sha256() &&
                    message.finish().byte_size() == payload.size();
       } else {
         largest_chunk = std::max(largest_chunk, message.chunk().size());
         payload += message.chunk();
+        if (!break_uploads_at.empty() && payload.size() >= break_uploads_at.front()) {
+          break_uploads_at.pop_front();
+          partial_[header.sha256()] = payload;
+          return {grpc::StatusCode::UNAVAILABLE, "broken off"};
+        }
       }
     }
     Sha256 sha = BeginParticleDigest(header.layout());
@@ -122,6 +151,8 @@ class FakeService final : public v1::RenderService::Service {
     return grpc::Status::OK;
   }
   size_t largest_chunk = 0;
+  std::vector<uint64_t> resume_offsets;   // of the uploads, in order
+  std::deque<uint64_t> break_uploads_at;  // bytes of payload at which the next ones break off
 
   grpc::Status RenderFrame(grpc::ServerContext* context, const v1::RenderFrameRequest* request,
                            grpc::ServerWriter<v1::RenderFrameResponse>* writer) override {
@@ -229,6 +260,7 @@ class FakeService final : public v1::RenderService::Service {
   std::map<std::string, std::deque<grpc::Status>> failures_;
   std::map<std::string, int> calls_;
   std::set<std::string> sets_;
+  std::map<std::string, std::string> partial_;
   std::string address_;
   std::unique_ptr<grpc::Server> server_;
 };

@@ -92,7 +92,7 @@ TEST_F(RenderCommandTest, AsksForNothingWhileAFrameIsMissing) {
   EXPECT_EQ(ExitCodeOf(status), ExitCode::kInput);
   EXPECT_THAT(MessageOf(status), HasSubstr("a.2.csv"));
   EXPECT_THAT(MessageOf(status), HasSubstr("1 of 3"));
-  EXPECT_EQ(service_.Calls("FindMissingParticles") + service_.Calls("RenderSequence"), 0);
+  EXPECT_EQ(service_.Calls("QueryUpload") + service_.Calls("RenderSequence"), 0);
   EXPECT_EQ(Files(), 2U);
 }
 

@@ -233,7 +233,7 @@ TEST(BadRequests, UploadsThatDoNotFitTogetherCommitNothing) {
     EXPECT_FALSE(status.error_message().empty());
     EXPECT_EQ(client.FindMissing({particles.sha256}).value().size(), 1U);
   }
-  EXPECT_TRUE(client.Upload(particles).ok());
+  EXPECT_TRUE(client.EnsureUploaded(particles).ok());
   EXPECT_TRUE(client.FindMissing({particles.sha256}).value().empty());
 }
 

@@ -55,11 +55,11 @@ TEST(ParticleCache, SetIsMissingUntilItIsSent) {
   ASSERT_NE(one.sha256, two.sha256);
   const std::vector<std::string> both = {one.sha256, two.sha256};
   EXPECT_EQ(client.FindMissing(both).value(), both);
-  ASSERT_TRUE(client.Upload(two).ok());
+  ASSERT_TRUE(client.EnsureUploaded(two).ok());
   EXPECT_EQ(client.FindMissing(both).value(), std::vector{one.sha256});
   ASSERT_TRUE(client.EnsureUploaded(one).ok());
   EXPECT_TRUE(client.FindMissing(both).value().empty());
-  EXPECT_TRUE(client.Upload(one).ok()) << "sent again it is no error";
+  EXPECT_TRUE(client.EnsureUploaded(one).ok()) << "sent again it is no error";
 }
 
 TEST(ParticleCache, NamedAndInlineParticlesGiveTheSameFrame) {
@@ -83,7 +83,7 @@ TEST(ParticleCache, DroppedSetIsNotFoundUntilTheClientSendsItAgain) {
   const client::EncodedParticles one = Encoded(*scene.particles);
   const v1::RenderFrameRequest request = Naming(scene, one.sha256);
   const client::RenderedFrame first = MustRender(client, request, &one);
-  ASSERT_TRUE(client.Upload(Encoded(*test::Ball(400, 2))).ok());
+  ASSERT_TRUE(client.EnsureUploaded(Encoded(*test::Ball(400, 2))).ok());
 
   EXPECT_EQ(client.FindMissing({one.sha256}).value(), std::vector{one.sha256});
   const auto refused = client.RenderFrame(request);

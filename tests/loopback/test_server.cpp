@@ -30,12 +30,13 @@ TestServer::TestServer(const ServerLimits& limits)
     : limits_(LimitsOnDevice(limits, Engine().device())),
       store_(limits.max_cache_bytes),
       upload_memory_(limits.max_cache_bytes),
+      partial_uploads_(upload_memory_, {.max_count = limits.max_partial_uploads}),
       pipeline_(Engine(), {.max_queued_frames = limits.max_queued_frames, .encode_threads = 2}) {
   static std::atomic<int> sockets = 0;
   const std::string socket = "unix:" + ::testing::TempDir() + "halflight-loopback." +
                              std::to_string(getpid()) + "." + std::to_string(sockets++);
   auto server = GrpcServer::Start({"127.0.0.1:0", socket}, {Engine().device(), limits_, version_,
-                                                            store_, upload_memory_, pipeline_});
+                                                            store_, partial_uploads_, pipeline_});
   if (!server.ok()) {
     ADD_FAILURE() << server.status();
     std::abort();

@@ -34,6 +34,7 @@ class TestServer {
   std::string version_ = "test";
   ParticleStore store_;
   ByteBudget upload_memory_;
+  PartialUploads partial_uploads_;
   FramePipeline pipeline_;
   std::unique_ptr<GrpcServer> server_;
 };

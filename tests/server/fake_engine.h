@@ -14,6 +14,7 @@
 #include "renderer/frame_engine.h"
 #include "server/convert/convert_frame.h"
 #include "server/encode/encode.h"
+#include "tests/server/made_particles.h"
 
 namespace halflight::testing {
 
@@ -72,9 +73,6 @@ class FakeEngine : public FrameEngine {
 // The images that the fake makes: their size is that of the window or light buffer, and pixel k of
 // image i is i + k / 1000.
 Image FakeImage(const Scene& scene, const ImageRequest& shown, size_t index);
-
-// Inline particles with every attribute listed; values are in range.
-v1::InlineParticles MakeParticles(int count, const std::vector<v1::ParticleAttribute>& attributes);
 
 // Two particles with a radius, a camera, one directional light with shadows, one beauty output.
 v1::RenderFrameRequest MakeRequest();

@@ -11,14 +11,18 @@
 #include <gtest/gtest.h>
 
 #include "halflight/crc32c.h"
+#include "server/error_detail.h"
 #include "server/handlers/find_missing_particles.h"
 #include "server/handlers/get_server_info.h"
+#include "server/handlers/query_upload.h"
 #include "server/handlers/render_frame.h"
 #include "server/handlers/render_sequence.h"
 #include "server/handlers/upload_particles.h"
-#include "server/retry_hint.h"
+#include "server/particle_files.h"
+#include "tests/process/process.h"
 #include "tests/process/wait_for.h"
 #include "tests/server/fake_engine.h"
+#include "tests/server/upload_messages.h"
 
 namespace halflight {
 namespace {
@@ -109,17 +113,97 @@ class Handlers : public ::testing::Test {
   std::string version_ = "1.2.3";
   ParticleStore store_{1 << 20};
   ByteBudget upload_memory_{1 << 20};
+  PartialUploads partial_uploads_{upload_memory_, {}};
   FramePipeline pipeline_{engine_,
                           {.max_queued_frames = 64, .encode_threads = 2, .encode = EncodePlain}};
-  Backend backend_{engine_.device(), limits_, version_, store_, upload_memory_, pipeline_};
+  Backend backend_{engine_.device(), limits_, version_, store_, partial_uploads_, pipeline_};
 };
+
+// A store whose only set was left on disk by an earlier server.
+struct OnDisk {
+  explicit OnDisk(const ServerLimits& limits) {
+    const auto particles = BuildInlineParticles(MakeRequest().scene().inline_particles(), limits);
+    sha256 = particles->sha256;
+    (*ParticleFiles::Open(folder / "cache", limits))->Write(sha256, particles->set);
+    store =
+        std::make_unique<ParticleStore>(1 << 20, *ParticleFiles::Open(folder / "cache", limits));
+    EXPECT_TRUE(store->OnDiskOnly(sha256));
+  }
+
+  [[nodiscard]] v1::RenderFrameRequest Request() const {
+    v1::RenderFrameRequest request = MakeRequest();
+    request.mutable_scene()->set_particle_sha256(sha256);
+    return request;
+  }
+
+  testing::Folder folder;
+  std::string sha256;
+  std::unique_ptr<ParticleStore> store;
+};
+
+TEST_F(Handlers, FrameWaitsForItsParticlesToBeReadFromDisk) {
+  const OnDisk disk(limits_);
+  const Backend backend{engine_.device(), limits_,          version_,
+                        *disk.store,      partial_uploads_, pipeline_};
+  FakeSink<v1::RenderFrameResponse> sink;
+  const auto handler = std::make_shared<RenderFrameHandler>(backend, sink);
+  handler->Start(disk.Request());
+  while (sink.WaitForWrite()) {
+    handler->OnWritten(true);
+  }
+  EXPECT_TRUE(sink.finished()->ok()) << *sink.finished();
+  EXPECT_TRUE(sink.written().back().has_trailer());
+}
+
+TEST_F(Handlers, FrameCancelledWhileItsParticlesAreReadIsNotRendered) {
+  const OnDisk disk(limits_);
+  const Backend backend{engine_.device(), limits_,          version_,
+                        *disk.store,      partial_uploads_, pipeline_};
+  FakeSink<v1::RenderFrameResponse> sink;
+  const auto handler = std::make_shared<RenderFrameHandler>(backend, sink);
+  handler->OnCancel();
+  handler->Start(disk.Request());
+  EXPECT_EQ(sink.WaitForFinish().code(), absl::StatusCode::kCancelled);
+  EXPECT_EQ(engine_.rendered(), 0);
+}
+
+TEST_F(Handlers, QueryTellsHowMuchOfAnUploadIsThere) {
+  const v1::InlineParticles particles = MakeParticles(10, {v1::PARTICLE_ATTRIBUTE_POSITION});
+  const v1::ParticleSetDescription header = testing::Describe(particles);
+  v1::QueryUploadRequest query;
+  query.set_sha256(header.sha256());
+  EXPECT_EQ(QueryUpload(backend_, query)->committed_bytes(), 0U);
+  {
+    UploadParticlesHandler upload(backend_);
+    EXPECT_FALSE(upload.OnRequest(testing::Header(header)).has_value());
+    EXPECT_FALSE(upload.OnRequest(testing::Chunk(particles.payload().substr(0, 50))).has_value());
+    EXPECT_EQ(QueryUpload(backend_, query)->committed_bytes(), 0U) << "it is under way";
+    EXPECT_FALSE(upload.OnEndOfRequests().ok());
+  }
+  EXPECT_EQ(QueryUpload(backend_, query)->committed_bytes(), 50U);
+  EXPECT_FALSE(QueryUpload(backend_, query)->complete());
+  UploadParticlesHandler upload(backend_);
+  EXPECT_FALSE(upload.OnRequest(testing::Header(header, 50)).has_value());
+  EXPECT_FALSE(upload.OnRequest(testing::Chunk(particles.payload().substr(50))).has_value());
+  EXPECT_FALSE(upload.OnRequest(testing::Finish(header)).has_value());
+  EXPECT_TRUE(upload.OnEndOfRequests().ok());
+  EXPECT_TRUE(QueryUpload(backend_, query)->complete());
+  query.set_sha256("short");
+  EXPECT_EQ(QueryUpload(backend_, query).status().message(), "sha256: 5 bytes, allowed: 32 bytes");
+}
 
 TEST_F(Handlers, ServerInfoTellsDeviceLimitsAndWhatIsOffered) {
   limits_.max_slices = 123;
+  limits_.partial_upload_seconds = 77;
+  limits_.max_partial_uploads = 78;
+  limits_.max_cache_dir_bytes = 79;
   const v1::GetServerInfoResponse info = GetServerInfo(backend_);
   EXPECT_EQ(info.server_version(), "1.2.3");
   EXPECT_EQ(info.gl_renderer(), "fake");
   EXPECT_EQ(info.limits().max_slices(), 123U);
+  EXPECT_EQ(info.limits().partial_upload_seconds(), 77U);
+  EXPECT_EQ(info.limits().max_partial_uploads(), 78U);
+  EXPECT_EQ(info.limits().max_cache_dir_bytes(), 79U);
   EXPECT_EQ(info.techniques_size(), v1::ShadowTechnique_ARRAYSIZE - 1);
   EXPECT_EQ(info.output_kinds_size(), v1::OutputKind_ARRAYSIZE - 1);
   EXPECT_EQ(info.formats_size(), v1::ImageFormat_ARRAYSIZE - 1);
@@ -363,7 +447,7 @@ TEST_F(Sequence, TargetIsKeptUntilSettingsTakeItsPlaceAndTheOtherWayRound) {
 
 TEST_F(Sequence, ParticlesOfTheStreamSurviveTheirEviction) {
   ParticleStore small(2 * 16);
-  Backend backend{engine_.device(), limits_, version_, small, upload_memory_, pipeline_};
+  Backend backend{engine_.device(), limits_, version_, small, partial_uploads_, pipeline_};
   const auto particles = BuildInlineParticles(MakeRequest().scene().inline_particles(), limits_);
   small.Insert(particles->sha256, particles->set);
   handler_ = std::make_shared<RenderSequenceHandler>(backend, sink_);
@@ -379,6 +463,32 @@ TEST_F(Sequence, ParticlesOfTheStreamSurviveTheirEviction) {
     handler_->OnWritten(true);
   }
   EXPECT_TRUE(sink_.finished()->ok()) << *sink_.finished();
+}
+
+TEST_F(Sequence, ParticlesOnDiskAreReadBeforeTheirFrames) {
+  const OnDisk disk(limits_);
+  Backend backend{engine_.device(), limits_, version_, *disk.store, partial_uploads_, pipeline_};
+  handler_ = std::make_shared<RenderSequenceHandler>(backend, sink_);
+  handler_->Start();
+  handler_->OnRequest(Wrap(disk.Request()));
+  ASSERT_TRUE(WaitFor([this] { return sink_.reads() == 2; })) << "it reads on once they are there";
+  handler_->OnRequest(Same());
+  handler_->OnEndOfRequests();
+  while (sink_.WaitForWrite()) {
+    handler_->OnWritten(true);
+  }
+  EXPECT_TRUE(sink_.finished()->ok()) << *sink_.finished();
+  EXPECT_EQ(engine_.rendered(), 2);
+}
+
+TEST_F(Sequence, CancelledWhileItsParticlesAreReadEndsOnce) {
+  const OnDisk disk(limits_);
+  Backend backend{engine_.device(), limits_, version_, *disk.store, partial_uploads_, pipeline_};
+  handler_ = std::make_shared<RenderSequenceHandler>(backend, sink_);
+  handler_->Start();
+  handler_->OnRequest(Wrap(disk.Request()));
+  handler_->OnCancel();
+  EXPECT_EQ(sink_.WaitForFinish().code(), absl::StatusCode::kCancelled);
 }
 
 TEST_F(Sequence, ErrorNamesItsFrameAfterAllFramesBeforeIt) {
@@ -421,7 +531,7 @@ TEST_F(Sequence, FullQueueKeepsItsHint) {
   engine_.RefuseWith(absl::ResourceExhaustedError("full"));
   Play({Wrap(MakeRequest())});
   EXPECT_EQ(sink_.finished()->code(), absl::StatusCode::kResourceExhausted);
-  EXPECT_TRUE(RetryHint(*sink_.finished()).has_value());
+  EXPECT_TRUE(DetailOf(*sink_.finished()).retry_after.has_value());
 }
 
 TEST_F(Sequence, SlowReaderStopsTheReadingAhead) {

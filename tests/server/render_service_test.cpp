@@ -18,6 +18,7 @@
 #include "server/grpc_server.h"
 #include "tests/process/wait_for.h"
 #include "tests/server/fake_engine.h"
+#include "tests/server/upload_messages.h"
 
 namespace halflight {
 namespace {
@@ -31,7 +32,7 @@ using testing::WaitFor;
 
 class Service : public ::testing::Test {
  protected:
-  Service() {
+  explicit Service(const ServerLimits& limits = {}) : limits_(limits) {
     auto server = GrpcServer::Start({"127.0.0.1:0"}, backend_);
     EXPECT_TRUE(server.ok()) << server.status();
     server_ = *std::move(server);
@@ -67,7 +68,7 @@ class Service : public ::testing::Test {
       call->Write(grpc::ByteBuffer(&slice, 1), nullptr);
       wait();
     }
-    if (rpc == "RenderFrame") {
+    if (rpc != "RenderSequence") {
       call->WritesDone(nullptr);
       wait();
     }
@@ -89,11 +90,12 @@ class Service : public ::testing::Test {
   FakeEngine engine_;
   ServerLimits limits_;
   std::string version_ = "1.2.3";
-  ParticleStore store_{1 << 20};
-  ByteBudget upload_memory_{1 << 20};
+  ParticleStore store_{8 << 20};
+  ByteBudget upload_memory_{8 << 20};
+  PartialUploads partial_uploads_{upload_memory_, {}};
   FramePipeline pipeline_{engine_,
                           {.max_queued_frames = 2, .encode_threads = 2, .encode = EncodePlain}};
-  Backend backend_{engine_.device(), limits_, version_, store_, upload_memory_, pipeline_};
+  Backend backend_{engine_.device(), limits_, version_, store_, partial_uploads_, pipeline_};
   std::unique_ptr<GrpcServer> server_;
   std::shared_ptr<grpc::Channel> channel_;
   std::unique_ptr<v1::RenderService::Stub> stub_;
@@ -156,7 +158,7 @@ TEST_F(Service, FullQueueSaysWhenToRetry) {
   for (int i = 0; i < 2; ++i) {
     clients.emplace_back([this] { EXPECT_TRUE(RenderAll(MakeRequest()).ok()); });
   }
-  ASSERT_TRUE(WaitFor([this] { return engine_.waiting() == 2; }));
+  ASSERT_TRUE(WaitFor([this] { return pipeline_.queued() == 2; }));
   grpc::ClientContext context;
   auto reader = stub_->RenderFrame(&context, MakeRequest());
   v1::RenderFrameResponse response;
@@ -164,6 +166,72 @@ TEST_F(Service, FullQueueSaysWhenToRetry) {
   EXPECT_EQ(reader->Finish().error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED);
   EXPECT_EQ(context.GetServerTrailingMetadata().count("grpc-retry-pushback-ms"), 1U);
   engine_.SetGate(true);
+}
+
+class ImpatientService : public Service {
+ protected:
+  ImpatientService() : Service({.max_stall_seconds = 1, .max_calls = 2}) {}
+};
+
+TEST_F(ImpatientService, ReaderThatStopsReadingLosesItsCallAndHoldsNothing) {
+  grpc::ClientContext context;
+  auto reader = stub_->RenderFrame(&context, LargeRequest());
+  v1::RenderFrameResponse response;
+  ASSERT_TRUE(reader->Read(&response));
+  EXPECT_FALSE(server_->idle());
+  EXPECT_TRUE(WaitFor([this] { return server_->idle(); })) << "the call waits for its reader";
+  while (reader->Read(&response)) {
+  }
+  EXPECT_EQ(reader->Finish().error_code(), grpc::StatusCode::CANCELLED);
+}
+
+TEST_F(ImpatientService, UploadThatStopsSendingLosesItsCall) {
+  grpc::ClientContext context;
+  v1::UploadParticlesResponse response;
+  const auto writer = stub_->UploadParticles(&context, &response);
+  ASSERT_TRUE(WaitFor([this] { return !server_->idle(); }));
+  EXPECT_TRUE(WaitFor([this] { return server_->idle(); })) << "the call waits for its writer";
+  EXPECT_EQ(writer->Finish().error_code(), grpc::StatusCode::CANCELLED);
+}
+
+TEST_F(ImpatientService, SequenceMayWaitForItsNextRequestAsLongAsItLikes) {
+  grpc::ClientContext context;
+  auto stream = stub_->RenderSequence(&context);
+  std::this_thread::sleep_for(std::chrono::milliseconds(1500));
+  v1::RenderSequenceRequest request;
+  *request.mutable_frame() = MakeRequest();
+  stream->Write(request);
+  stream->WritesDone();
+  v1::RenderSequenceResponse response;
+  while (stream->Read(&response)) {
+  }
+  const grpc::Status status = stream->Finish();
+  EXPECT_TRUE(status.ok()) << status.error_message();
+}
+
+TEST_F(ImpatientService, CallsBeyondTheLimitAreToldToComeBack) {
+  engine_.SetGate(false);
+  std::vector<std::jthread> clients;
+  for (int i = 0; i < 2; ++i) {
+    clients.emplace_back([this] { EXPECT_TRUE(RenderAll(MakeRequest()).ok()); });
+  }
+  ASSERT_TRUE(WaitFor([this] { return pipeline_.queued() == 2; }));
+  grpc::ClientContext context;
+  v1::GetServerInfoResponse info;
+  const grpc::Status status = stub_->GetServerInfo(&context, {}, &info);
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED);
+  EXPECT_THAT(status.error_details(), HasSubstr("TOO_MANY_CALLS"));
+  EXPECT_EQ(context.GetServerTrailingMetadata().count("grpc-retry-pushback-ms"), 1U);
+  engine_.SetGate(true);
+}
+
+TEST_F(Service, ErrorCarriesItsFieldForPrograms) {
+  v1::RenderFrameRequest request = MakeRequest();
+  request.mutable_scene()->mutable_shadow()->set_slices(4000000000U);
+  const grpc::Status status = RenderAll(request);
+  EXPECT_THAT(status.error_details(), HasSubstr("type.googleapis.com/google.rpc.BadRequest"));
+  EXPECT_THAT(status.error_details(), HasSubstr("LIMIT_EXCEEDED"));
+  EXPECT_THAT(status.error_details(), HasSubstr("scene.shadow.slices"));
 }
 
 TEST_F(Service, SequenceComesInOrderWhileRequestsGoOn) {
@@ -254,23 +322,28 @@ TEST_F(Service, UploadedSetIsFoundAndRendered) {
   EXPECT_EQ(engine_.last_request().scene.particles->size(), 1000U);
 }
 
-TEST_F(Service, UploadWithAMalformedMessageCommitsNothing) {
+TEST_F(Service, UploadWithAMessageThatCannotBeReadIsNeverWellAndCommitsNothing) {
   const v1::InlineParticles particles =
-      MakeParticles(10, {v1::PARTICLE_ATTRIBUTE_POSITION, v1::PARTICLE_ATTRIBUTE_RADIUS});
-  Sha256 digest = BeginParticleDigest(particles.layout());
-  digest.Update(particles.payload());
-  const std::string sha256 = digest.Finish();
-  v1::UploadParticlesRequest header;
-  *header.mutable_header()->mutable_layout() = particles.layout();
-  header.mutable_header()->set_byte_size(particles.payload().size());
-  header.mutable_header()->set_sha256(sha256);
-  v1::UploadParticlesRequest chunk;
-  chunk.set_chunk(particles.payload());
-
-  EXPECT_FALSE(
-      Send("UploadParticles", {header.SerializeAsString(), chunk.SerializeAsString(), kMalformed})
-          .ok());
-  EXPECT_FALSE(store_.Touch(sha256));
+      MakeParticles(100000, {v1::PARTICLE_ATTRIBUTE_POSITION, v1::PARTICLE_ATTRIBUTE_RADIUS});
+  const v1::ParticleSetDescription description = testing::Describe(particles);
+  const std::string header = testing::Header(description).SerializeAsString();
+  const std::string chunk = testing::Chunk(particles.payload()).SerializeAsString();
+  const std::string finish = testing::Finish(description).SerializeAsString();
+  for (const std::vector<std::string>& stream : std::vector<std::vector<std::string>>{
+           {header, chunk, kMalformed},
+           {header, chunk, kMalformed, finish},
+           {kMalformed, header, chunk, finish},
+           {header, chunk.substr(0, chunk.size() - 1), finish},
+           {header, chunk, finish.substr(0, finish.size() - 1)},
+           {header, testing::Chunk(std::string(3 * kMiB, '\0')).SerializeAsString(), finish},
+           {header, finish, chunk},
+           {chunk, header, finish},
+           {finish},
+           {header, chunk},
+           {""}}) {
+    EXPECT_FALSE(Send("UploadParticles", stream).ok());
+    EXPECT_FALSE(store_.Touch(description.sha256()));
+  }
 }
 
 TEST_F(Service, MalformedRequestsForFramesAreRefused) {

@@ -1,0 +1,100 @@
+#include "server/partial_uploads.h"
+
+#include <algorithm>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "server/convert/field_checks.h"
+#include "server/status_text.h"
+
+namespace halflight {
+
+PartialUploads::Entries::iterator PartialUploads::Find(const std::string& sha256) {
+  return std::find_if(kept_.begin(), kept_.end(), [&sha256](const Entry& entry) {
+    return entry.upload->header.sha256() == sha256;
+  });
+}
+
+void PartialUploads::Expire(Entries& dropped) {
+  const auto now = options_.now();
+  while (!kept_.empty() && now - kept_.back().since >= options_.max_age) {
+    dropped.splice(dropped.end(), kept_, std::prev(kept_.end()));
+  }
+}
+
+uint64_t PartialUploads::CommittedBytes(const std::string& sha256) {
+  Entries dropped;
+  const std::lock_guard lock(mutex_);
+  Expire(dropped);
+  const auto found = Find(sha256);
+  return found == kept_.end() ? 0 : found->upload->assembler.received_bytes();
+}
+
+absl::StatusOr<std::unique_ptr<PartialUpload>> PartialUploads::Take(
+    const v1::ParticleSetDescription& header) {
+  Entries dropped;
+  const std::lock_guard lock(mutex_);
+  Expire(dropped);
+  const auto found = Find(header.sha256());
+  // A header that lies about the layout gets nothing of an honest one's upload.
+  const bool fits = found != kept_.end() && ParticlePrefix(found->upload->header.layout()) ==
+                                                ParticlePrefix(header.layout());
+  const uint64_t committed = fits ? found->upload->assembler.received_bytes() : 0;
+  if (header.resume_offset() > committed) {
+    return WithCode(absl::StatusCode::kOutOfRange,
+                    FieldError("header.resume_offset", fmt::format("{}", header.resume_offset()),
+                               fmt::format("at most {}, the bytes kept of this set", committed)));
+  }
+  std::unique_ptr<PartialUpload> taken = std::move(found->upload);
+  kept_.erase(found);
+  return taken;
+}
+
+void PartialUploads::Keep(std::unique_ptr<PartialUpload> upload) {
+  if (upload->assembler.received_bytes() == 0 || options_.max_count == 0 ||
+      options_.max_age.count() == 0) {
+    return;
+  }
+  Entries dropped;
+  const std::lock_guard lock(mutex_);
+  Expire(dropped);
+  if (const auto found = Find(upload->header.sha256()); found != kept_.end()) {
+    if (found->upload->assembler.received_bytes() > upload->assembler.received_bytes()) {
+      std::swap(found->upload, upload);
+    }
+    dropped.splice(dropped.end(), kept_, found);
+  }
+  kept_.push_front({std::move(upload), options_.now()});
+  if (kept_.size() > options_.max_count) {
+    dropped.splice(dropped.end(), kept_, std::prev(kept_.end()));
+  }
+}
+
+void PartialUploads::Drop(const std::string& sha256) {
+  Entries dropped;
+  const std::lock_guard lock(mutex_);
+  if (const auto found = Find(sha256); found != kept_.end()) {
+    dropped.splice(dropped.end(), kept_, found);
+  }
+}
+
+bool PartialUploads::Grow(ByteBudget::Share& share, uint64_t bytes) {
+  while (!share.Grow(bytes)) {
+    Entries dropped;
+    const std::lock_guard lock(mutex_);
+    if (kept_.empty()) {
+      return false;
+    }
+    dropped.splice(dropped.end(), kept_, std::prev(kept_.end()));
+  }
+  return true;
+}
+
+void PartialUploads::DropExpired() {
+  Entries dropped;
+  const std::lock_guard lock(mutex_);
+  Expire(dropped);
+}
+
+}  // namespace halflight
