@@ -45,15 +45,4 @@ std::vector<Band> CutIntoBands(const glm::ivec2& window_size, const glm::ivec2& 
   return bands;
 }
 
-void CopyBand(const Image& part, const Band& band, Image& image) {
-  const size_t channels = image.channels.size();
-  const size_t row_values = channels * static_cast<size_t>(band.pixels.width);
-  for (int row = 0; row < band.pixels.height; ++row) {
-    const size_t to = static_cast<size_t>(band.pixels.y + row) * static_cast<size_t>(image.width) +
-                      static_cast<size_t>(band.pixels.x);
-    std::copy_n(&part.pixels[static_cast<size_t>(row) * row_values], row_values,
-                &image.pixels[to * channels]);
-  }
-}
-
 }  // namespace halflight

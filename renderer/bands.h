@@ -6,7 +6,6 @@
 
 #include <glm/vec2.hpp>
 
-#include "renderer/image.h"
 #include "renderer/scene.h"
 
 namespace halflight {
@@ -21,8 +20,5 @@ struct Band {
 // which are interpolated, neighbours share samples. `composite_size`: all samples.
 std::vector<Band> CutIntoBands(const glm::ivec2& window_size, const glm::ivec2& composite_size,
                                const Sampling& sampling, int max_side);
-
-// Copies `part`, an image of one band, to its place in `image`, which has the same channels.
-void CopyBand(const Image& part, const Band& band, Image& image);
 
 }  // namespace halflight

@@ -39,21 +39,6 @@ std::vector<std::string> ValueChannels(bool colored) {
 
 }  // namespace
 
-Image ReadTexture(const gl::Texture& texture) {
-  Image image{texture.width(), texture.height(), 1, {"R", "G", "B", "A"}, {}};
-  image.pixels.resize(4 * PixelCount(image));
-  glPixelStorei(GL_PACK_ALIGNMENT, 1);
-  glGetTextureImage(texture.name(), 0, GL_RGBA, GL_FLOAT,
-                    static_cast<GLsizei>(image.pixels.size() * sizeof(float)), image.pixels.data());
-  return image;
-}
-
-void AddColors(const Image& other, Image& image) {
-  for (size_t i = 0; i < image.pixels.size(); ++i) {
-    if (i % 4 != 3) image.pixels[i] += other.pixels[i];
-  }
-}
-
 Image CoverageOf(const Image& image) {
   return MapPixels(image, {"A"}, [](const float* rgba, float* a) { *a = rgba[3]; });
 }

@@ -1,10 +1,9 @@
-// Turns what was drawn into the images that were asked for. Reads targets back; draws nothing.
+// Turns what was drawn into the images that were asked for. Draws and reads back nothing: no GL.
 #pragma once
 
 #include <vector>
 
 #include "renderer/frame.h"
-#include "renderer/gl/object.h"
 #include "renderer/image.h"
 #include "renderer/scene.h"
 
@@ -28,12 +27,6 @@ struct DrawnImages {
 
 // The images that were asked for. The last beauty among them takes what was drawn, uncopied.
 std::vector<Image> SelectImages(const FrameRequest& request, DrawnImages&& drawn);
-
-// All four channels of a texture. Waits for the device.
-Image ReadTexture(const gl::Texture& texture);
-
-// R G B A += other, of the same size.
-void AddColors(const Image& other, Image& image);
 
 // The alpha channel of a composited image.
 Image CoverageOf(const Image& image);

@@ -3,13 +3,17 @@
 #include <algorithm>
 #include <utility>
 
+#include "renderer/frame_images.h"
+#include "renderer/gl/debug.h"
 #include "renderer/particle_view.h"
-#include "renderer/shadow_technique.h"
-#include "renderer/stage_clock.h"
+#include "renderer/readback.h"
 
 namespace halflight {
 
 namespace {
+
+// How soon a frame that waits for the device notices that it was cancelled.
+constexpr std::chrono::milliseconds kPatience(1);
 
 // Passes whose work an earlier frame left are not run.
 void MarkReused(const std::vector<PlannedPass>& reused, FramePlan& plan) {
@@ -26,6 +30,9 @@ FrameRenderer::FrameRenderer(std::unique_ptr<gl::EglContext> context,
                              const FrameRendererOptions& options)
     : context_(std::move(context)), device_(context_->device()), cache_(options.max_reuse_bytes) {
   device_.max_texture_size = std::min(device_.max_texture_size, options.max_texture_size);
+  const int by_device = device_.software ? 1 : 2;
+  frames_in_flight_ =
+      static_cast<size_t>(options.frames_in_flight > 0 ? options.frames_in_flight : by_device);
 }
 
 absl::StatusOr<std::unique_ptr<FrameRenderer>> FrameRenderer::Create(
@@ -37,41 +44,101 @@ absl::StatusOr<std::unique_ptr<FrameRenderer>> FrameRenderer::Create(
 
 absl::StatusOr<FrameResult> FrameRenderer::Render(const FrameRequest& request,
                                                   const std::stop_token& stop) {
-  StageClock clock;
-  clock.BeginCpu("plan");
-  const Scene& scene = request.scene;
+  absl::StatusOr<std::unique_ptr<Begun>> frame = Begin(request, stop);
+  if (!frame.ok()) return frame.status();
+  return Finish(*std::move(frame));
+}
+
+absl::StatusOr<std::unique_ptr<FrameRenderer::Begun>> FrameRenderer::Begin(FrameRequest request,
+                                                                           std::stop_token stop) {
+  auto frame = std::make_unique<Begun>();
+  frame->request = std::move(request);
+  // What the request leaves to the device.
+  SliceCompositor& compositor = frame->request.scene.shadow.compositor;
+  compositor = CompositorFor(compositor, device().software);
+  frame->stop = std::move(stop);
+  if (absl::Status status = Record(*frame); !status.ok()) {
+    // What it left behind is no other frame's.
+    gl::ForgetErrors();
+    return status;
+  }
+  return frame;
+}
+
+absl::Status FrameRenderer::Record(Begun& frame) {
+  gl::ForgetErrors();
+  frame.clock.BeginCpu("plan");
+  const Scene& scene = frame.request.scene;
   cache_.ForgetGoneSets();
   FrameCache nothing_kept(0);
-  FrameCache& cache = request.reuse ? cache_ : nothing_kept;
+  FrameCache& cache = frame.request.reuse ? cache_ : nothing_kept;
   const auto particles =
       cache.FindOrMake(scene.particles, ParticleViewKeyOf(scene),
                        [&]() -> absl::StatusOr<ParticleView> { return ParticleView(scene); });
   if (!particles.ok()) return particles.status();
-  absl::StatusOr<FramePlan> plan = PlanFrame(request, **particles);
+  frame.clamped_opacities = (*particles)->clamped_opacities();
+  absl::StatusOr<FramePlan> plan = PlanFrame(frame.request, **particles);
   if (!plan.ok()) return plan.status();
+  frame.plan = *std::move(plan);
   const DrawContext context{.gpu = gpu_,
                             .device = device(),
                             .cache = cache,
-                            .request = request,
+                            .request = frame.request,
                             .particles = **particles,
-                            .plan = *plan,
-                            .clock = clock,
-                            .stop = stop};
+                            .plan = frame.plan,
+                            .clock = frame.clock,
+                            .stop = frame.stop,
+                            .staging = frames_in_flight_ > 1 ? &staging_ : nullptr};
   const ShadowTechnique& technique = TechniqueFor(scene.shadow.technique);
   absl::StatusOr<DrawnFrame> drawn = technique.Draw(context);
-  if (absl::IsResourceExhausted(drawn.status()) && !cache_.empty()) {
-    // What was kept may be what there is no room beside.
+  if (absl::IsResourceExhausted(drawn.status()) && (!cache_.empty() || frames_in_flight_ > 1)) {
+    // What was kept may be what there is no room beside, or what frames in flight hold: until the
+    // device is through with them, and with what they dropped.
     cache_.Clear();
+    staging_.Clear();
+    if (frames_in_flight_ > 1) glFinish();
+    gl::ForgetErrors();
     drawn = technique.Draw(context);
   }
   if (!drawn.ok()) return drawn.status();
-  MarkReused(drawn->reused, *plan);
+  frame.drawn = *std::move(drawn);
+  MarkReused(frame.drawn.reused, frame.plan);
+  frame.clock.EndStage();
+  if (frame.drawn.arriving != nullptr) frame.drawn.arriving->readback.Submit();
+  return absl::OkStatus();
+}
+
+bool FrameRenderer::DrawsOnDevice(const FrameRequest& request) const {
+  return TechniqueFor(request.scene.shadow.technique).DrawsOnDevice(request, device_);
+}
+
+bool FrameRenderer::CanFinish(const Begun& frame, std::chrono::nanoseconds wait) const {
+  if (frame.drawn.arriving == nullptr || frame.stop.stop_requested()) return true;
+  return frame.drawn.arriving->readback.Arrived(wait);
+}
+
+absl::StatusOr<FrameResult> FrameRenderer::Finish(std::unique_ptr<Begun> frame) {
+  if (frame->drawn.arriving != nullptr) frame->clock.BeginCpu("readback");
+  while (!CanFinish(*frame, kPatience)) {
+  }
+  if (frame->stop.stop_requested()) {
+    gl::ForgetErrors();
+    return absl::CancelledError("frame cancelled");
+  }
   FrameResult result;
-  result.images = std::move(drawn->images);
-  result.plan = *std::move(plan);
-  result.lights = std::move(drawn->reports);
-  result.clamped_opacities = (*particles)->clamped_opacities();
-  result.timings = clock.Finish();
+  if (frame->drawn.arriving == nullptr) {
+    result.images = std::move(frame->drawn.images);
+  } else {
+    ArrivingImages& arriving = *frame->drawn.arriving;
+    arriving.readback.Deliver();
+    if (absl::Status status = gl::CheckErrors("readback"); !status.ok()) return status;
+    frame->clock.BeginCpu("images");
+    result.images = SelectImages(frame->request, std::move(arriving.drawn));
+  }
+  result.plan = std::move(frame->plan);
+  result.lights = std::move(frame->drawn.reports);
+  result.clamped_opacities = frame->clamped_opacities;
+  result.timings = frame->clock.Finish();
   return result;
 }
 

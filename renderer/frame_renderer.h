@@ -1,18 +1,23 @@
 // Renders frames on one GL context: start reading here.
 #pragma once
 
+#include <chrono>
 #include <cstddef>
 #include <limits>
 #include <memory>
 #include <stop_token>
 #include <string>
 
+#include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "renderer/frame.h"
 #include "renderer/frame_cache.h"
 #include "renderer/frame_engine.h"
 #include "renderer/gl/egl_context.h"
+#include "renderer/gl/staging.h"
 #include "renderer/gpu.h"
+#include "renderer/shadow_technique.h"
+#include "renderer/stage_clock.h"
 
 namespace halflight {
 
@@ -21,22 +26,52 @@ struct FrameRendererOptions {
   // nothing is reused.
   size_t max_reuse_bytes = size_t{1} << 30U;
   // Largest side of a render target or a light buffer, where it is less than the device's; at
-  // least 16.
+  // least 64.
   int max_texture_size = std::numeric_limits<int>::max();
+  // Of which one is read back while the device draws the others; one: every frame is read back as
+  // soon as it is drawn. 0: two on GPUs, one on CPU rasterisers, which draw when told to.
+  int frames_in_flight = 0;
 };
 
 class FrameRenderer {
  public:
+  // A frame between its halves: what it was drawn from, and what is on its way.
+  struct Begun {
+    FrameRequest request;
+    std::stop_token stop;
+    StageClock clock;
+    FramePlan plan;
+    DrawnFrame drawn;
+    size_t clamped_opacities = 0;
+  };
+
   // Makes a context on the device (see RenderThreadOptions) and on this thread, which must make all
   // further calls. Errors as EglContext::Create.
   static absl::StatusOr<std::unique_ptr<FrameRenderer>> Create(
       const std::string& device, const FrameRendererOptions& options = {});
 
-  // Errors: InvalidArgument where the technique cannot do what is asked, Cancelled soon after
-  // `stop` was requested, ResourceExhausted when the device is out of memory, Internal for a fault
-  // of GL or of a shader. The renderer stays usable after each of them. A frame has the same images
-  // whatever was rendered before it; a particle set must not change once it has been rendered.
+  // Both halves of a frame. Errors: InvalidArgument where the technique cannot do what is asked,
+  // Cancelled soon after `stop` was requested, ResourceExhausted when the device is out of memory,
+  // Internal for a fault of GL or of a shader. The renderer stays usable after each of them. A
+  // frame has the same images whatever was rendered before it; a particle set must not change once
+  // it has been rendered.
   absl::StatusOr<FrameResult> Render(const FrameRequest& request, const std::stop_token& stop);
+
+  // The first half: plans the frame, uploads what it needs, and records what the device shall do
+  // and copy; work of the CPU is done when it returns. Others may be begun and finished before this
+  // one is finished, in any order, and what becomes of them is nothing to it. Whatever it returned
+  // must be gone before the renderer is.
+  absl::StatusOr<std::unique_ptr<Begun>> Begin(FrameRequest request, std::stop_token stop);
+  // Whether the second half need not wait for the device, or only finds that it was cancelled.
+  // Waits for that itself, at most for so long.
+  [[nodiscard]] bool CanFinish(const Begun& frame, std::chrono::nanoseconds wait) const;
+  // The second half: waits for the device where it must, and takes over what it has copied.
+  absl::StatusOr<FrameResult> Finish(std::unique_ptr<Begun> frame);
+
+  // As many frames as are worth having begun at once.
+  [[nodiscard]] size_t frames_in_flight() const { return frames_in_flight_; }
+  // Whether the device draws the frame, so that beginning it is only a matter of recording.
+  [[nodiscard]] bool DrawsOnDevice(const FrameRequest& request) const;
 
   [[nodiscard]] const DeviceInfo& device() const { return device_; }
   [[nodiscard]] const FrameCache& cache() const { return cache_; }
@@ -46,11 +81,16 @@ class FrameRenderer {
  private:
   FrameRenderer(std::unique_ptr<gl::EglContext> context, const FrameRendererOptions& options);
 
+  // Begins `frame`, of which request and stop are set.
+  absl::Status Record(Begun& frame);
+
   std::unique_ptr<gl::EglContext> context_;
   DeviceInfo device_;
   // After context_, which these need from their first to their last moment.
   Gpu gpu_;
   FrameCache cache_;
+  gl::StagingMemory staging_;
+  size_t frames_in_flight_;
 };
 
 }  // namespace halflight

@@ -5,6 +5,7 @@
 #include <deque>
 #include <future>
 #include <mutex>
+#include <optional>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -39,10 +40,21 @@ class RenderThread : public FrameEngine {
     Clock::time_point submitted;
   };
 
+  // A job whose frame was begun, or failed to be.
+  struct Flight {
+    Job job;  // without its request
+    double queued_ms = 0.0;
+    absl::StatusOr<std::unique_ptr<FrameRenderer::Begun>> frame;
+  };
+
   void Run(std::promise<absl::StatusOr<DeviceInfo>> started);
+  void Serve(FrameRenderer& renderer);
   void WarmUp(FrameRenderer& renderer);
-  // Waits for a job; false when stopping and none is left.
-  bool NextJob(Job& job);
+  // The next job. `idle`: waits for it; none when stopping and none is left. Otherwise none where
+  // none is there, or where it would keep frames in flight waiting.
+  std::optional<Job> NextJob(const FrameRenderer& renderer, bool idle);
+  static Flight Begin(FrameRenderer& renderer, Job job);
+  void Finish(FrameRenderer& renderer, Flight flight);
 
   const RenderThreadOptions options_;
   DeviceInfo device_;
@@ -90,13 +102,57 @@ absl::Status RenderThread::Submit(FrameRequest request, std::stop_token stop, Do
   return absl::OkStatus();
 }
 
-bool RenderThread::NextJob(Job& job) {
+std::optional<RenderThread::Job> RenderThread::NextJob(const FrameRenderer& renderer, bool idle) {
   std::unique_lock lock(mutex_);
-  changed_.wait(lock, [&] { return stopping_ || !jobs_.empty(); });
-  if (jobs_.empty()) return false;
-  job = std::move(jobs_.front());
+  if (idle) changed_.wait(lock, [&] { return stopping_ || !jobs_.empty(); });
+  if (jobs_.empty()) return std::nullopt;
+  if (!idle && !renderer.DrawsOnDevice(jobs_.front().request)) return std::nullopt;
+  Job job = std::move(jobs_.front());
   jobs_.pop_front();
-  return true;
+  return job;
+}
+
+RenderThread::Flight RenderThread::Begin(FrameRenderer& renderer, Job job) {
+  const std::chrono::duration<double, std::milli> waited = Clock::now() - job.submitted;
+  if (job.stop.stop_requested()) {
+    return {std::move(job), waited.count(), absl::CancelledError("frame cancelled")};
+  }
+  auto frame = renderer.Begin(std::move(job.request), job.stop);
+  return {std::move(job), waited.count(), std::move(frame)};
+}
+
+void RenderThread::Finish(FrameRenderer& renderer, Flight flight) {
+  absl::StatusOr<FrameResult> frame =
+      flight.frame.ok() ? renderer.Finish(*std::move(flight.frame)) : flight.frame.status();
+  if (frame.ok()) frame->timings.insert(frame->timings.begin(), {"queue", flight.queued_ms});
+  {
+    const std::lock_guard lock(mutex_);
+    --unfinished_;
+  }
+  flight.job.done(std::move(frame));
+}
+
+// Begins what waits, as long as another may be in flight, and finishes the oldest as soon as the
+// device has come to its end.
+void RenderThread::Serve(FrameRenderer& renderer) {
+  constexpr std::chrono::milliseconds kPatience(1);  // how soon a job is noticed meanwhile
+  std::deque<Flight> flights;                        // the oldest first
+  for (;;) {
+    bool begun = false;
+    if (flights.size() < renderer.frames_in_flight()) {
+      std::optional<Job> job = NextJob(renderer, flights.empty());
+      begun = job.has_value();
+      if (job) flights.push_back(Begin(renderer, *std::move(job)));
+      if (flights.empty()) return;
+    }
+    const Flight& oldest = flights.front();
+    const auto wait = begun ? std::chrono::milliseconds(0) : kPatience;
+    if (oldest.frame.ok() && !renderer.CanFinish(**oldest.frame, wait)) continue;
+    Flight flight = std::move(flights.front());
+    flights.pop_front();
+    Finish(renderer, std::move(flight));
+    if (flights.empty()) WarmUp(renderer);
+  }
 }
 
 // Ends where there is a job: what a request wants goes before what others may want.
@@ -126,18 +182,7 @@ void RenderThread::Run(std::promise<absl::StatusOr<DeviceInfo>> started) {
     warm_up_.assign(frames.begin(), frames.end());
     WarmUp(**renderer);
   }
-  for (Job job; NextJob(job); job = {}, WarmUp(**renderer)) {
-    const std::chrono::duration<double, std::milli> waited = Clock::now() - job.submitted;
-    absl::StatusOr<FrameResult> frame = job.stop.stop_requested()
-                                            ? absl::CancelledError("frame cancelled")
-                                            : (*renderer)->Render(job.request, job.stop);
-    if (frame.ok()) frame->timings.insert(frame->timings.begin(), {"queue", waited.count()});
-    {
-      const std::lock_guard lock(mutex_);
-      --unfinished_;
-    }
-    job.done(std::move(frame));
-  }
+  Serve(**renderer);
 }
 
 }  // namespace

@@ -2,6 +2,7 @@
 // without GL and draws it whole; it has a row in the table of shadow_technique.cpp.
 #pragma once
 
+#include <memory>
 #include <stop_token>
 #include <string>
 #include <vector>
@@ -10,6 +11,7 @@
 #include "absl/status/statusor.h"
 #include "renderer/frame.h"
 #include "renderer/particle_view.h"
+#include "renderer/readback.h"
 
 namespace halflight {
 
@@ -17,7 +19,6 @@ class FrameCache;
 struct DeviceInfo;
 struct Gpu;
 struct Projection;
-class StageClock;
 
 // Everything that a frame is drawn from. `plan` is that of the same request.
 struct DrawContext {
@@ -29,10 +30,12 @@ struct DrawContext {
   const FramePlan& plan;
   StageClock& clock;
   std::stop_token stop;
+  gl::StagingMemory* staging = nullptr;  // for what is read back; null: each copy waits
 };
 
 struct DrawnFrame {
-  std::vector<Image> images;         // in the order of the request
+  std::vector<Image> images;  // in the order of the request; empty where they are `arriving`
+  std::unique_ptr<ArrivingImages> arriving;
   std::vector<LightReport> reports;  // one for each light of the scene
   std::vector<PlannedPass> reused;   // of the plan: not run, since the cache had what they give
 };
@@ -51,7 +54,12 @@ class ShadowTechnique {
   virtual absl::Status Plan(const FrameRequest& request, const ParticleView& particles,
                             FramePlan& plan) const = 0;
 
-  // Cancelled soon after the context's stop was requested. The GL context is current.
+  // Whether Draw records what the device does, rather than doing it itself; unless that fails.
+  [[nodiscard]] virtual bool DrawsOnDevice(const FrameRequest& request,
+                                           const DeviceInfo& device) const = 0;
+
+  // Cancelled soon after the context's stop was requested. The GL context is current. Call with no
+  // GL error unread: those that are there when it returns an error are this frame's.
   [[nodiscard]] virtual absl::StatusOr<DrawnFrame> Draw(const DrawContext& context) const = 0;
 };
 
@@ -62,6 +70,10 @@ const ShadowTechnique& TechniqueFor(ShadowTechniqueKind kind);
 // otherwise half-angle slicing. On GPUs that stays so until the sweep has been measured on one.
 // `request.scene.shadow.technique` does not matter.
 ShadowTechniqueKind DefaultTechnique(const FrameRequest& request, bool software_renderer);
+
+// What half-angle slicing composites by where a request asks for `asked`: kAuto becomes one of the
+// others, tiles on GPUs, which are short of blend units.
+SliceCompositor CompositorFor(SliceCompositor asked, bool software_renderer);
 
 // What a tool needs to place the buffer of a light that casts shadows.
 LightReport ReportOf(const Projection& light);

@@ -15,11 +15,15 @@ namespace halflight {
 
 // Stages follow one another: each lasts from its Begin to the next. CPU stages are timed by the
 // steady clock, device stages by GL timestamps, which are read only at the end so that nothing
-// waits. Stages of the same name are summed.
+// waits. A timestamp is taken when the device has done what came before it, so that a stage has
+// nothing of a frame that was recorded earlier. Stages of the same name are summed.
 class StageClock {
  public:
   void BeginCpu(const char* stage);
   void BeginGpu(const char* stage);
+
+  // Ends the stage: what goes on until the next one is not the frame's.
+  void EndStage();
 
   // Ends the last stage and waits for the device.
   std::vector<StageTiming> Finish();
@@ -32,7 +36,6 @@ class StageClock {
     gl::Query end;
   };
 
-  void EndStage();
   void Add(const std::string& stage, double milliseconds, bool on_device);
 
   std::vector<StageTiming> timings_;

@@ -106,7 +106,8 @@ int Run(const Options& options, std::vector<ListeningSocket> inherited, const si
   auto engine =
       StartRenderThread({.device = options.device,
                          .max_queued_frames = static_cast<int>(options.limits.max_queued_frames),
-                         .renderer = {.max_reuse_bytes = options.max_reuse_bytes},
+                         .renderer = {.max_reuse_bytes = options.max_reuse_bytes,
+                                      .frames_in_flight = options.frames_in_flight},
                          .warm_up = true});
   if (!engine.ok()) {
     return Fail(kExitCannotStart, engine.status());

@@ -12,7 +12,6 @@
 #include <CLI/CLI.hpp>
 
 #include "absl/strings/numbers.h"
-#include "absl/strings/strip.h"
 #include "renderer/scene.h"
 #include "server/convert/field_checks.h"
 #include "server/version.h"
@@ -91,6 +90,9 @@ void AddLimitFlags(CLI::App& app, Options& options) {
   bytes("--max-reuse-bytes", options.max_reuse_bytes,
         "Bytes of what frames leave to later ones of the same particles, in main memory and on the "
         "device together; 0 reuses nothing");
+  number("--frames-in-flight", options.frames_in_flight,
+         "Frames drawn at once, one of which is read back while the device draws the others; 0: 2 "
+         "on a GPU, 1 on a CPU rasteriser");
   number("--max-image-size", limits.max_image_size,
          "Width and height of an image, times supersampling");
   number("--max-light-buffer-size", limits.max_light_buffer_size, "Texels along a light buffer");
@@ -164,6 +166,7 @@ absl::Status Check(const Options& options) {
   checks.InRange("--drain-seconds", options.drain_seconds, {.low = 0.0, .high = 86400.0});
 
   const ServerLimits& limits = options.limits;
+  checks.InRange("--frames-in-flight", options.frames_in_flight, {.low = 0.0, .high = 16.0});
   // Larger ones overflow the renderer's 32-bit sizes.
   checks.InRange("--max-image-size", limits.max_image_size, {.low = 1.0, .high = 32768.0});
   checks.InRange("--max-light-buffer-size", limits.max_light_buffer_size,
@@ -194,14 +197,13 @@ absl::Status Check(const Options& options) {
 
 // CLI11 does not say whether a wrong value stood in the file, so that both are named.
 std::string ParseMessage(const CLI::ParseError& error, const std::string& config_file) {
-  constexpr absl::string_view kUnknown = "INI was not able to parse ";
-  absl::string_view what = error.what();
-  if (absl::ConsumePrefix(&what, kUnknown)) {
+  const std::string what = error.what();
+  const std::string unknown = "INI was not able to parse ";
+  if (what.rfind(unknown, 0) == 0) {
     return fmt::format("{}: {}: is no flag, allowed: those that --help lists, without dashes",
-                       config_file, std::string(what));
+                       config_file, what.substr(unknown.size()));
   }
-  return config_file.empty() ? std::string(what)
-                             : fmt::format("{} (given, or in {})", std::string(what), config_file);
+  return config_file.empty() ? what : fmt::format("{} (given, or in {})", what, config_file);
 }
 
 }  // namespace

@@ -25,6 +25,7 @@ struct Options {
   int encode_threads = 0;  // filled in: one for each core, less the one that renders
   int drain_seconds = 30;
   uint64_t max_reuse_bytes = 1 * kGiB;  // as in FrameRendererOptions
+  int frames_in_flight = 0;             // as in FrameRendererOptions
 };
 
 // What a flag does not say is taken from the file that --config names: a line "<flag> = <value>"

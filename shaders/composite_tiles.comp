@@ -11,7 +11,6 @@
 #include "bindings.h"
 #include "splat.glsl"
 #include "tile_records.glsl"
-#include "workgroup.glsl"
 
 layout(constant_id = kTileChunkConstant) const uint kChunk = 1;  // particles loaded at once
 layout(constant_id = kTileLightsConstant) const uint kTileLights = 0;
@@ -137,9 +136,10 @@ vec4 LayerOf(uint s, vec2 pixel, vec2 ray, float inverse_length) {
 }
 
 void main() {
-  uint tile = WorkgroupIndex();
+  uvec2 tile_at = gl_WorkGroupID.xy + composite.tiles.xy;
+  uint tile = tile_at.y * composite.tiles.z + tile_at.x;
   ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
-  vec2 sample_at = vec2(pixel) + 0.5;
+  vec2 sample_at = vec2(tile_at * gl_WorkGroupSize.xy + gl_LocalInvocationID.xy) + 0.5;
   vec2 ray = PlaneFromPixel(sample_at);
   float inverse_length = 1.0 / (dot(ray, ray) + 1.0);
   bool inside = all(lessThan(pixel, imageSize(target)));

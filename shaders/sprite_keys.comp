@@ -1,12 +1,11 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
 // The sort key of every particle: its depth along an orthographic target's axis, else its squared
-// distance from the eye. Tells too whether any is near.
+// distance from the eye.
 #include "bindings.h"
 #include "sprites.glsl"
 
 layout(std430, binding = kSpriteKeysBinding) writeonly buffer Keys { uint keys[]; };
-layout(std430, binding = kAnyNearBinding) buffer AnyNear { uint any_near; };
 
 // OrderedKey() of renderer/sort.h.
 uint OrderedKey(float value) {
@@ -19,7 +18,6 @@ void main() {
   uint i = InvocationIndex();
   if (i >= particles.count.x) return;
   dvec3 view = ViewOf(i);
-  if (-view.z <= target.near_depths.x * DrawnRadius(i, -view.z)) atomicOr(any_near, 1u);
   precise double distance_squared = view.x * view.x + view.y * view.y + view.z * view.z;
   double depth = kOrthographic ? -view.z : distance_squared;
   keys[i] = OrderedKey(float(depth));

@@ -5,7 +5,7 @@
 
 #include "absl/status/status.h"
 #include "renderer/gpu.h"
-#include "renderer/image.h"
+#include "renderer/light_spread.h"
 #include "renderer/passes/project.h"
 #include "renderer/scene.h"
 
@@ -33,20 +33,11 @@ absl::Status DepositSlice(Gpu& gpu, const gl::Buffer& light_splats, const Target
 
 void CopyLightBuffer(const LightBuffer& from, const LightBuffer& to);
 
-// How far light spreads sideways: variances along x and y of each colour, in squared texels.
-struct BlurVariance {
-  glm::dvec3 x;
-  glm::dvec3 y;
-};
-
 // Spreads the light in `buffer`, or where it holds the unscattered light, what is scattered.
 // `density` is the light's shadow density; red serves for a buffer that is not colored. `scratch`
 // is of the same size, its contents are lost.
 absl::Status BlurLightBuffer(Gpu& gpu, LightBuffer& buffer, LightBuffer& scratch,
                              const BlurVariance& variance, const glm::vec3& density,
                              const LightChannels& channels);
-
-// The optical depth as it stands; one or three channels. Waits for the device.
-Image ReadLightBuffer(const LightBuffer& buffer, bool colored);
 
 }  // namespace halflight

@@ -1,18 +1,20 @@
 #include "renderer/techniques/half_angle.h"
 
+#include <memory>
 #include <utility>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "renderer/bands.h"
 #include "renderer/frame_engine.h"
-#include "renderer/frame_images.h"
 #include "renderer/gl/debug.h"
 #include "renderer/gpu.h"
 #include "renderer/passes/composite.h"
 #include "renderer/passes/project.h"
 #include "renderer/passes/resolve.h"
+#include "renderer/readback.h"
 #include "renderer/techniques/half_angle_light.h"
+#include "renderer/techniques/half_angle_tiles.h"
 #include "renderer/techniques/traversal_context.h"
 
 namespace halflight {
@@ -38,7 +40,8 @@ void DescribePasses(FramePlan& plan) {
     } else {
       plan.passes.push_back(DescribeSort(traversal));
       plan.passes.push_back({"project particles for the eye", "every traversal", 1});
-      plan.passes.push_back({"composite", "the image", 1});
+      plan.passes.push_back(traversal.in_tiles ? DescribeCompositeInTiles()
+                                               : PlannedPass{"composite", "the image", 1});
     }
   }
 }
@@ -62,19 +65,22 @@ absl::Status DrawUnshadowed(const TraversalContext& context) {
   absl::StatusOr<gl::Buffer> splats = ProjectParticles(
       context.gpu, context.buffers, **order, context.eye, "project particles for the eye");
   if (!splats.ok()) return splats.status();
-  context.clock.BeginGpu("light and composite");
   const CompositePass composite =
       PrepareComposite(context.scene, context.traversal, **order, context.buffers,
                        context.eye.projection, *splats, nullptr, nullptr, context.targets.front());
+  if (context.traversal.in_tiles) return DrawUnshadowedInTiles(context, composite);
+  context.clock.BeginGpu("light and composite");
   return CompositeSlice(context.gpu, composite, 0, (*order)->count(), nullptr, context.targets);
 }
 
-// Reads one texture of every band back, resolved where sampling asks for it, as one image.
-absl::StatusOr<Image> ReadBands(const TraversalContext& context, const FramePlan& plan,
-                                const std::vector<Band>& bands,
-                                gl::Texture CompositeTarget::*texture) {
+// Reads one texture of every band back, resolved where sampling asks for it, into one image; `add`:
+// to what other traversals brought there.
+absl::Status ReadBands(const TraversalContext& context, const FramePlan& plan,
+                       const std::vector<Band>& bands, gl::Texture CompositeTarget::*texture,
+                       Image& image, bool add = false) {
   const Sampling& sampling = context.scene.sampling;
-  Image image{plan.window_size.x, plan.window_size.y, 1, {"R", "G", "B", "A"}, {}};
+  image = {
+      plan.window_size.x, plan.window_size.y, 1, {"R", "G", "B", "A"}, std::move(image.pixels)};
   for (size_t b = 0; b < bands.size(); ++b) {
     const gl::Texture& samples = context.targets[b].*texture;
     gl::Texture resolved;
@@ -84,49 +90,38 @@ absl::StatusOr<Image> ReadBands(const TraversalContext& context, const FramePlan
       if (!pixels.ok()) return pixels.status();
       resolved = *std::move(pixels);
     }
-    Image part = ReadTexture(resolved ? resolved : samples);
-    if (bands.size() == 1) return part;
-    image.pixels.resize(size_t{4} * static_cast<size_t>(image.width) *
-                        static_cast<size_t>(image.height));
-    CopyBand(part, bands[b], image);
+    const PixelRect& pixels = bands[b].pixels;
+    context.readback.Copy(resolved ? resolved : samples,
+                          {.image = image, .at = {pixels.x, pixels.y}, .add = add});
   }
-  return image;
+  return absl::OkStatus();
 }
 
-// Draws one traversal and reads back what it adds to the frame.
+// Draws one traversal and has read back what it adds to the frame.
 absl::Status DrawTraversal(const TraversalContext& context, const FramePlan& plan,
                            const std::vector<Band>& bands, std::vector<LightReport>& reports,
                            DrawnImages& drawn) {
   const Traversal& traversal = context.traversal;
   if (traversal.shadow_light) {
     const auto light = static_cast<size_t>(*traversal.shadow_light);
-    absl::StatusOr<ShadowResult> shadow = DrawHalfAngleLight(context, reports[light]);
-    if (!shadow.ok()) return shadow.status();
-    drawn.shadows[light] = *std::move(shadow);
+    absl::Status status = DrawHalfAngleLight(context, reports[light], drawn.shadows[light]);
+    if (!status.ok()) return status;
   } else if (absl::Status status = DrawUnshadowed(context); !status.ok()) {
     return status;
   }
 
-  context.clock.BeginCpu("readback");
-  absl::StatusOr<Image> image = ReadBands(context, plan, bands, &CompositeTarget::image);
-  if (!image.ok()) return image.status();
-  if (drawn.beauty.pixels.empty()) {
-    drawn.beauty = *std::move(image);
-  } else {
-    AddColors(*image, drawn.beauty);
+  context.readback.BeginStage(context.clock);
+  const bool first = &traversal == &plan.traversals.front();
+  absl::Status status =
+      ReadBands(context, plan, bands, &CompositeTarget::image, drawn.beauty, !first);
+  if (status.ok() && context.targets.front().depth) {
+    status = ReadBands(context, plan, bands, &CompositeTarget::depth, drawn.depth);
   }
-  if (context.targets.front().depth) {
-    absl::StatusOr<Image> depth = ReadBands(context, plan, bands, &CompositeTarget::depth);
-    if (!depth.ok()) return depth.status();
-    drawn.depth = *std::move(depth);
+  if (status.ok() && context.targets.front().transmittance) {
+    status = ReadBands(context, plan, bands, &CompositeTarget::transmittance,
+                       drawn.transmittance[static_cast<size_t>(*traversal.shadow_light)]);
   }
-  if (context.targets.front().transmittance) {
-    absl::StatusOr<Image> transmittance =
-        ReadBands(context, plan, bands, &CompositeTarget::transmittance);
-    if (!transmittance.ok()) return transmittance.status();
-    drawn.transmittance[static_cast<size_t>(*traversal.shadow_light)] = *std::move(transmittance);
-  }
-  return absl::OkStatus();
+  return status;
 }
 
 }  // namespace
@@ -150,7 +145,6 @@ absl::Status HalfAngle::Plan(const FrameRequest& request, const ParticleView& pa
       continue;
     }
     Traversal traversal = PlanHalfAngleLight(scene, particles, light);
-    traversal.shadow_light = light;
     KeepWhatOutputsShow(request.images, traversal);
     plan.traversals.push_back(std::move(traversal));
   }
@@ -158,6 +152,7 @@ absl::Status HalfAngle::Plan(const FrameRequest& request, const ParticleView& pa
   // parallel rays, each from an eye of its own, that is the depth along them.
   if (plan.traversals.empty()) {
     plan.traversals.emplace_back();
+    plan.traversals.front().in_tiles = scene.shadow.compositor == SliceCompositor::kTiles;
     if (std::holds_alternative<Orthographic>(scene.camera.projection)) {
       plan.traversals.front().axis = ViewDirection(scene.camera);
     }
@@ -173,7 +168,6 @@ absl::StatusOr<DrawnFrame> HalfAngle::Draw(const DrawContext& context) const {
   const Scene& scene = context.request.scene;
   const FramePlan& plan = context.plan;
   if (absl::Status status = CheckLightBuffers(plan, context.device); !status.ok()) return status;
-  gl::ForgetErrors();
 
   // Bring particles and camera to the device.
   context.clock.BeginCpu("upload");
@@ -184,10 +178,11 @@ absl::StatusOr<DrawnFrame> HalfAngle::Draw(const DrawContext& context) const {
   const TargetProjection eye = UploadProjection(eye_projection, context.particles);
 
   // Walk over the particles once for each light that casts shadows, and add up the light.
-  DrawnImages drawn;
+  DrawnFrame frame;
+  frame.arriving = std::make_unique<ArrivingImages>(context.staging);
+  DrawnImages& drawn = frame.arriving->drawn;
   drawn.transmittance.resize(scene.lights.size());
   drawn.shadows.resize(scene.lights.size());
-  DrawnFrame frame;
   frame.reports.resize(scene.lights.size());
   const std::vector<Band> bands = CutIntoBands(plan.window_size, plan.composite_size,
                                                scene.sampling, context.device.max_texture_size);
@@ -202,6 +197,7 @@ absl::StatusOr<DrawnFrame> HalfAngle::Draw(const DrawContext& context) const {
                                             traversal.keep_transmittance));
     }
     const TraversalContext walk{.gpu = context.gpu,
+                                .device = context.device,
                                 .cache = context.cache,
                                 .scene = scene,
                                 .traversal = traversal,
@@ -210,6 +206,7 @@ absl::StatusOr<DrawnFrame> HalfAngle::Draw(const DrawContext& context) const {
                                 .eye = eye,
                                 .targets = targets,
                                 .reused = frame.reused,
+                                .readback = frame.arriving->readback,
                                 .clock = context.clock,
                                 .stop = context.stop};
     if (absl::Status status = DrawTraversal(walk, plan, bands, frame.reports, drawn);
@@ -218,9 +215,6 @@ absl::StatusOr<DrawnFrame> HalfAngle::Draw(const DrawContext& context) const {
     }
   }
   if (absl::Status status = gl::CheckErrors("frame"); !status.ok()) return status;
-
-  context.clock.BeginCpu("images");
-  frame.images = SelectImages(context.request, std::move(drawn));
   return frame;
 }
 

@@ -11,6 +11,10 @@ class HalfAngle : public ShadowTechnique {
   [[nodiscard]] absl::Status Check(const FrameRequest& request) const override;
   absl::Status Plan(const FrameRequest& request, const ParticleView& particles,
                     FramePlan& plan) const override;
+  [[nodiscard]] bool DrawsOnDevice(const FrameRequest& /*request*/,
+                                   const DeviceInfo& /*device*/) const override {
+    return true;
+  }
   [[nodiscard]] absl::StatusOr<DrawnFrame> Draw(const DrawContext& context) const override;
 };
 

@@ -37,9 +37,10 @@ PlannedPass DescribeSort(const Traversal& traversal);
 // The passes that the traversal comes to, for people.
 std::vector<PlannedPass> DescribeHalfAnglePasses(const Traversal& traversal);
 
-// Draws the traversal into the context's targets and fills in `report`. Cancelled when the
-// context's stop token says so. Needs the GL context.
-absl::StatusOr<ShadowResult> DrawHalfAngleLight(const TraversalContext& context,
-                                                LightReport& report);
+// Draws the traversal into the context's targets and fills in `report`; the context's readback will
+// fill in what outputs show of `shadow`. Cancelled when the context's stop token says so. Needs the
+// GL context.
+absl::Status DrawHalfAngleLight(const TraversalContext& context, LightReport& report,
+                                ShadowResult& shadow);
 
 }  // namespace halflight

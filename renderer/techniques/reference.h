@@ -12,6 +12,10 @@ class Reference : public ShadowTechnique {
   [[nodiscard]] absl::Status Check(const FrameRequest& request) const override;
   absl::Status Plan(const FrameRequest& request, const ParticleView& particles,
                     FramePlan& plan) const override;
+  [[nodiscard]] bool DrawsOnDevice(const FrameRequest& /*request*/,
+                                   const DeviceInfo& /*device*/) const override {
+    return false;
+  }
   [[nodiscard]] absl::StatusOr<DrawnFrame> Draw(const DrawContext& context) const override;
 };
 

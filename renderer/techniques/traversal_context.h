@@ -6,17 +6,20 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
+#include "renderer/frame_engine.h"
 #include "renderer/frame_plan.h"
 #include "renderer/gpu.h"
 #include "renderer/particle_view.h"
 #include "renderer/passes/composite.h"
 #include "renderer/passes/project.h"
+#include "renderer/readback.h"
 #include "renderer/stage_clock.h"
 
 namespace halflight {
 
 struct TraversalContext {
   Gpu& gpu;
+  const DeviceInfo& device;
   FrameCache& cache;
   const Scene& scene;
   const Traversal& traversal;
@@ -25,6 +28,7 @@ struct TraversalContext {
   const TargetProjection& eye;
   std::span<const CompositeTarget> targets;  // one for each band of the image
   std::vector<PlannedPass>& reused;          // as in DrawnFrame
+  Readback& readback;
   StageClock& clock;
   std::stop_token stop;
 };

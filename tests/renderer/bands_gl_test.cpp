@@ -52,11 +52,12 @@ struct BandCase {
 
 class BandsOf : public Bands, public testing::WithParamInterface<BandCase> {};
 
-TEST_P(BandsOf, ShowWhatIsDrawnAtOnce) {
-  FrameRequest request = Request();
-  GetParam().change(request.scene);
-  const FrameResult whole = Render(request);
-  absl::StatusOr<FrameResult> bands = SmallRenderer().Render(request, {});
+void ExpectSameInBands(const FrameRequest& request, FrameRenderer& at_once,
+                       FrameRenderer& in_bands) {
+  const absl::StatusOr<FrameResult> drawn = at_once.Render(request, {});
+  ASSERT_TRUE(drawn.ok()) << drawn.status();
+  const FrameResult& whole = *drawn;
+  const absl::StatusOr<FrameResult> bands = in_bands.Render(request, {});
   ASSERT_TRUE(bands.ok()) << bands.status();
   ASSERT_EQ(bands->images.size(), whole.images.size());
   for (size_t i = 0; i < whole.images.size(); ++i) {
@@ -64,6 +65,27 @@ TEST_P(BandsOf, ShowWhatIsDrawnAtOnce) {
     EXPECT_TRUE(bands->images[i].pixels == whole.images[i].pixels)
         << "output " << i << ", off by " << test::MaxDifference(bands->images[i], whole.images[i]);
   }
+}
+
+TEST_P(BandsOf, ShowWhatIsDrawnAtOnce) {
+  FrameRequest request = Request();
+  GetParam().change(request.scene);
+  ExpectSameInBands(request, Renderer(), SmallRenderer());
+}
+
+// With tiles that reach over the borders between bands.
+TEST_P(BandsOf, ShowWhatTheSweepDrawsAtOnceOnTheDevice) {
+  FrameRequest request = Request();
+  GetParam().change(request.scene);
+  request.scene.shadow.technique = ShadowTechniqueKind::kLightSweep;
+  request.scene.shadow.fit_degree = 1;
+  request.sweep_on = SweepOn::kDevice;
+  request.images = {{ImageKind::kBeauty},
+                    {ImageKind::kDepth},
+                    {ImageKind::kLightTransmittance, 1},
+                    {ImageKind::kLightBuffer, 1, LightQuantity::kOpticalDepth}};
+  if (!request.scene.lights[1].casts_shadows()) request.images.resize(2);
+  ExpectSameInBands(request, Renderer(), SmallRenderer());
 }
 
 INSTANTIATE_TEST_SUITE_P(
@@ -85,6 +107,19 @@ INSTANTIATE_TEST_SUITE_P(
                                s.camera.window = window;
                              }}),
     [](const auto& instance) { return instance.param.name; });
+
+// Tiles begin with their band, and sums are cut where tiles' lists are.
+TEST_F(Bands, OfTilesShowWhatIsDrawnAtOnceButForRounding) {
+  FrameRequest request = Request();
+  request.scene.sampling.supersample = 3;
+  request.scene.shadow.compositor = SliceCompositor::kTiles;
+  const FrameResult whole = Render(request);
+  absl::StatusOr<FrameResult> bands = SmallRenderer().Render(request, {});
+  ASSERT_TRUE(bands.ok()) << bands.status();
+  for (const size_t i : {0, 1, 3, 4, 5, 6}) {  // depth is infinite in places
+    EXPECT_LT(test::MaxDifference(bands->images[i], whole.images[i]), 5e-6) << "output " << i;
+  }
+}
 
 TEST_F(Bands, LightBuffersStayWithinTheDevice) {
   FrameRequest request = Request();

@@ -10,6 +10,7 @@
 #include "renderer/gl/debug.h"
 #include "renderer/gl/egl_context.h"
 #include "renderer/gpu.h"
+#include "renderer/readback.h"
 
 namespace halflight::test {
 
@@ -49,6 +50,13 @@ std::vector<T> ReadBuffer(const gl::Buffer& buffer, size_t count) {
   glGetNamedBufferSubData(buffer.name(), 0, static_cast<GLsizeiptr>(count * sizeof(T)),
                           values.data());
   return values;
+}
+
+// All four channels of a texture, now.
+inline Image ReadTexture(const gl::Texture& texture) {
+  Image image{texture.width(), texture.height(), 1, {"R", "G", "B", "A"}, {}};
+  Readback(nullptr).Copy(texture, {image});
+  return image;
 }
 
 }  // namespace halflight::test

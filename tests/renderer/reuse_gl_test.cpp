@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <ostream>
 #include <string>
 #include <vector>
 
@@ -79,23 +80,43 @@ const std::vector<Variation>& Variations() {
   return variations;
 }
 
-class Reuse : public test::GlTest, public testing::WithParamInterface<ShadowTechniqueKind> {
+// What draws.
+struct Drawing {
+  const char* name;
+  ShadowTechniqueKind technique;
+  SweepOn sweep_on = SweepOn::kCpu;
+};
+constexpr Drawing kSlices = {"HalfAngle", ShadowTechniqueKind::kHalfAngle};
+constexpr Drawing kSweep = {"LightSweep", ShadowTechniqueKind::kLightSweep};
+constexpr Drawing kSweepOnDevice = {"LightSweepOnDevice", ShadowTechniqueKind::kLightSweep,
+                                    SweepOn::kDevice};
+void PrintTo(const Drawing& drawing, std::ostream* out) { *out << drawing.name; }
+std::string NameOf(const testing::TestParamInfo<Drawing>& instance) { return instance.param.name; }
+
+class Reuse : public test::GlTest, public testing::WithParamInterface<Drawing> {
  protected:
   Reuse() : renderer_(*FrameRenderer::Create("auto")) {}
 
   static Scene Base() {
     Scene scene = test::BallScene(400);
-    scene.shadow.technique = GetParam();
+    scene.shadow.technique = GetParam().technique;
     scene.shadow.slices = 12;
     return scene;
   }
 
   static FrameRequest AllOutputs(const Scene& scene) {
     FrameRequest request{scene, {{ImageKind::kBeauty}, {ImageKind::kDepth}}};
+    request.sweep_on = GetParam().sweep_on;
     if (scene.lights[0].casts_shadows()) {
       request.images.push_back({ImageKind::kLightTransmittance, 0});
       request.images.push_back({ImageKind::kLightBuffer, 0});
     }
+    return request;
+  }
+
+  static FrameRequest Beauty(const Scene& scene) {
+    FrameRequest request = test::Beauty(scene);
+    request.sweep_on = GetParam().sweep_on;
     return request;
   }
 
@@ -108,7 +129,7 @@ class Reuse : public test::GlTest, public testing::WithParamInterface<ShadowTech
   // Passes of the frame that were not run.
   std::vector<std::string> Kept(const Scene& scene) {
     std::vector<std::string> names;
-    for (const PlannedPass& pass : Draw(test::Beauty(scene)).plan.passes) {
+    for (const PlannedPass& pass : Draw(Beauty(scene)).plan.passes) {
       if (pass.count == 0) names.push_back(pass.name);
     }
     return names;
@@ -117,13 +138,8 @@ class Reuse : public test::GlTest, public testing::WithParamInterface<ShadowTech
   std::unique_ptr<FrameRenderer> renderer_;
 };
 
-INSTANTIATE_TEST_SUITE_P(Techniques, Reuse,
-                         testing::Values(ShadowTechniqueKind::kHalfAngle,
-                                         ShadowTechniqueKind::kLightSweep),
-                         [](const auto& instance) {
-                           return instance.param == ShadowTechniqueKind::kHalfAngle ? "HalfAngle"
-                                                                                    : "LightSweep";
-                         });
+INSTANTIATE_TEST_SUITE_P(Techniques, Reuse, testing::Values(kSlices, kSweep, kSweepOnDevice),
+                         NameOf);
 
 void ExpectSameBytes(const FrameResult& a, const FrameResult& b, const std::string& what) {
   ASSERT_EQ(a.images.size(), b.images.size()) << what;
@@ -157,7 +173,7 @@ TEST_P(Reuse, GivesTheSameBytesWhateverWasDrawnBefore) {
 
 TEST_P(Reuse, KeepsNothingOfSetsThatAreGone) {
   const Scene base = Base();
-  Draw(test::Beauty(base));
+  Draw(Beauty(base));
   const size_t of_base = renderer_->cache().bytes();
   EXPECT_GT(of_base, 0U);
   Scene scene = base;
@@ -165,28 +181,28 @@ TEST_P(Reuse, KeepsNothingOfSetsThatAreGone) {
   for (uint32_t seed = 2; seed < 8; ++seed) {
     scene.particles.reset();
     scene.particles = test::Ball(400, seed);
-    FrameRequest fresh = test::Beauty(scene);
+    FrameRequest fresh = Beauty(scene);
     fresh.reuse = false;
-    ExpectSameBytes(Draw(test::Beauty(scene)), Draw(fresh), "seed " + std::to_string(seed));
+    ExpectSameBytes(Draw(Beauty(scene)), Draw(fresh), "seed " + std::to_string(seed));
   }
   const std::weak_ptr<const ParticleSet> watch = scene.particles;
   scene.particles.reset();
   EXPECT_TRUE(watch.expired());
-  Draw(test::Beauty(base));
+  Draw(Beauty(base));
   EXPECT_EQ(renderer_->cache().bytes(), of_base);
 }
 
 TEST_P(Reuse, StaysWithinItsBound) {
   const Scene base = Base();
-  Draw(test::Beauty(base));
+  Draw(Beauty(base));
   const size_t bound = renderer_->cache().bytes() * 3 / 2;
   const auto bounded = *FrameRenderer::Create("auto", {.max_reuse_bytes = bound});
   const auto without = *FrameRenderer::Create("auto", {.max_reuse_bytes = 0});
   for (const Variation& variation : Variations()) {
     Scene scene = base;
     variation.change(scene);
-    const auto frame = bounded->Render(test::Beauty(scene), {});
-    const auto other = without->Render(test::Beauty(scene), {});
+    const auto frame = bounded->Render(Beauty(scene), {});
+    const auto other = without->Render(Beauty(scene), {});
     ASSERT_TRUE(frame.ok() && other.ok());
     ExpectSameBytes(*frame, *other, variation.name);
     EXPECT_LE(bounded->cache().bytes(), bound);
@@ -196,7 +212,7 @@ TEST_P(Reuse, StaysWithinItsBound) {
 }
 
 TEST_P(Reuse, IsOffWhereTheRequestSaysSo) {
-  FrameRequest request = test::Beauty(Base());
+  FrameRequest request = Beauty(Base());
   Draw(request);
   request.reuse = false;
   for (const PlannedPass& pass : Draw(request).plan.passes) EXPECT_GT(pass.count, 0) << pass.name;
@@ -207,8 +223,7 @@ TEST_P(Reuse, IsOffWhereTheRequestSaysSo) {
 }
 
 using ReuseOfSweep = Reuse;
-INSTANTIATE_TEST_SUITE_P(Techniques, ReuseOfSweep,
-                         testing::Values(ShadowTechniqueKind::kLightSweep));
+INSTANTIATE_TEST_SUITE_P(Techniques, ReuseOfSweep, testing::Values(kSweep, kSweepOnDevice), NameOf);
 
 const std::vector<std::string> kLight = {"sort along the light",
                                          "sweep the light buffer through the particles",
@@ -241,8 +256,7 @@ TEST_P(ReuseOfSweep, TurningTheLightKeepsWhatTheEyeSees) {
 }
 
 using ReuseOfSlices = Reuse;
-INSTANTIATE_TEST_SUITE_P(Techniques, ReuseOfSlices,
-                         testing::Values(ShadowTechniqueKind::kHalfAngle));
+INSTANTIATE_TEST_SUITE_P(Techniques, ReuseOfSlices, testing::Values(kSlices), NameOf);
 
 // The half vector turns with the camera: only what leaves it where it is keeps the order.
 TEST_P(ReuseOfSlices, KeepTheOrderWhileTheHalfVectorStays) {

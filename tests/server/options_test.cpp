@@ -43,7 +43,7 @@ TEST(Options, TakeSeveralAddressesAndSizesWithSuffixes) {
   const auto options =
       Parse({"--address", "0.0.0.0:0", "--address", "unix:/tmp/x", "--max-cache-bytes", "3GiB",
              "--max-particle-bytes", "64MiB", "--max-slices", "77", "--drain-seconds", "5",
-             "--max-reuse-bytes", "0"});
+             "--max-reuse-bytes", "0", "--frames-in-flight", "3"});
   ASSERT_TRUE(options.ok() && options->has_value()) << options.status();
   EXPECT_THAT((*options)->addresses, ElementsAre("0.0.0.0:0", "unix:/tmp/x"));
   EXPECT_EQ((*options)->limits.max_cache_bytes, 3 * kGiB);
@@ -51,6 +51,7 @@ TEST(Options, TakeSeveralAddressesAndSizesWithSuffixes) {
   EXPECT_EQ((*options)->limits.max_slices, 77U);
   EXPECT_EQ((*options)->drain_seconds, 5);
   EXPECT_EQ((*options)->max_reuse_bytes, 0U);
+  EXPECT_EQ((*options)->frames_in_flight, 3);
 }
 
 TEST(Options, HelpNamesEveryFlagAndRunsNothing) {
@@ -73,6 +74,7 @@ TEST(Options, HelpNamesEveryFlagAndRunsNothing) {
                            "--max-light-buffer-size",
                            "--max-slices",
                            "--max-lights",
+                           "--frames-in-flight",
                            "--max-outputs",
                            "--max-output-bytes",
                            "--max-queued-frames",
@@ -105,6 +107,8 @@ TEST(Options, ErrorsNameFlagValueAndWhatIsAllowed) {
               HasSubstr("--max-cache-bytes: 1048576, allowed: at least --max-particle-bytes"));
   EXPECT_THAT(ErrorOf({"--max-cache-bytes", "-1"}), HasSubstr("--max-cache-bytes: -1, allowed: "));
   EXPECT_THAT(ErrorOf({"--drain-seconds", "-1"}), HasSubstr("--drain-seconds"));
+  EXPECT_THAT(ErrorOf({"--frames-in-flight", "17"}),
+              HasSubstr("--frames-in-flight: 17, allowed: [0, 16]"));
   EXPECT_THAT(ErrorOf({"--no-such-flag"}), HasSubstr("--no-such-flag"));
   EXPECT_THAT(ErrorOf({"stray"}), HasSubstr("stray"));
 }

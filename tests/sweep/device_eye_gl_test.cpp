@@ -38,11 +38,11 @@ class EyePass {
     const glm::ivec2 size(scene.camera.window.width, scene.camera.window.height);
     eye_ = EyeProjection(scene.camera, size, 1.0);
     list_ = ListSprites(particles_, eye_, NearDepth(scene));
-    for (const Light& light : scene_.lights) {
+    for (size_t light = 0; light < scene_.lights.size(); ++light) {
       fits_.emplace_back();
-      if (!light.casts_shadows()) continue;
-      auto fit = FitLight(light, particles_, scene.material.profile, scene.shadow.light_buffer_size,
-                          scene.shadow.fit_degree, {});
+      if (!scene_.lights[light].casts_shadows()) continue;
+      auto fit =
+          FitLight(scene_, particles_, PlanLight(scene_, particles_, static_cast<int>(light)), {});
       EXPECT_TRUE(fit.ok()) << fit.status();
       if (fit.ok()) fits_.back() = *std::move(fit);
     }
@@ -109,12 +109,13 @@ class EyePass {
           CompositePlaces(gpu, scene_, eye, layout, *shaded, tiles, walk, targets, {});
       EXPECT_TRUE(status.ok()) << status;
     }
-    EyeImages images{ReadTexture(targets.beauty), ReadTexture(targets.depth), {}};
+    EyeImages images{test::ReadTexture(targets.beauty), test::ReadTexture(targets.depth), {}};
     for (size_t l = 0; l < fits_.size(); ++l) {
       images.transmittance.emplace_back();
       if (fits[l] == nullptr) continue;
       const int slot = TransmittanceSlot(layout.lights, static_cast<int>(l));
-      images.transmittance.back() = ReadTexture(targets.transmittance[static_cast<size_t>(slot)]);
+      images.transmittance.back() =
+          test::ReadTexture(targets.transmittance[static_cast<size_t>(slot)]);
     }
     return images;
   }
@@ -214,7 +215,7 @@ TEST_F(DeviceEye, DrawsFramesInRuns) {
   const auto in_runs = DrawOnDevice(context, {.most_run_bytes = 1});
   ASSERT_TRUE(at_once.ok()) << at_once.status();
   ASSERT_TRUE(in_runs.ok()) << in_runs.status();
-  EXPECT_LT(Difference(in_runs->images.at(0), at_once->images.at(0)), 2e-6);
+  EXPECT_LT(Difference(in_runs->arriving->drawn.beauty, at_once->arriving->drawn.beauty), 2e-6);
 }
 
 // One behind another, each over all of the image.

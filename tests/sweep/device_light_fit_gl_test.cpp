@@ -28,6 +28,13 @@ class DeviceLightFitTest : public test::DeviceTest {
                             scene.shadow.fit_degree, stop, settings);
   }
 
+  static std::vector<float> OpticalDepthOf(const DeviceLightFit& fit) {
+    Image image;
+    Readback readback(nullptr);
+    ReadOpticalDepth(fit, readback, image);
+    return image.pixels;
+  }
+
   // Fails the test where the fit fails.
   static FittedLight OnDevice(const Scene& scene, const LightSweepSettings& settings = {}) {
     const absl::StatusOr<DeviceLightFit> fit = FitOnDevice(scene, settings);
@@ -36,7 +43,7 @@ class DeviceLightFitTest : public test::DeviceTest {
     const size_t count = scene.particles->size();
     const size_t terms = static_cast<size_t>(Terms(fit->degree));
     return {test::ReadBuffer<float>(fit->depth, count * terms),
-            test::ReadBuffer<Sprite>(fit->sprites, count), ReadOpticalDepth(*fit).pixels};
+            test::ReadBuffer<Sprite>(fit->sprites, count), OpticalDepthOf(*fit)};
   }
 
   static FitDifference Compare(const std::string& name, const Scene& scene,

@@ -1,14 +1,17 @@
 // Lists made on the device against those of the CPU, and against the particles themselves.
-#include "renderer/block_cache.h"
 #include "renderer/sweep/device/lists.h"
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstring>
 #include <functional>
+#include <span>
 
 #include <glm/gtc/matrix_access.hpp>
 
+#include "renderer/block_cache.h"
+#include "renderer/sweep/device/runs.h"
 #include "tests/renderer/device_fixture.h"
 #include "tests/renderer/test_scene.h"
 
@@ -156,8 +159,8 @@ class ListDeviceSpritesOf : public test::DeviceTest, public testing::WithParamIn
  protected:
   static absl::StatusOr<DeviceSprites> List(const Cloud& cloud) {
     const ParticleView particles(cloud.scene);
-    return ListDeviceSprites(Device(), UploadParticles(particles), particles.set().origin,
-                             cloud.target, cloud.near_depth);
+    return ListDeviceSprites(Device(), UploadParticles(particles), particles, cloud.target,
+                             cloud.near_depth);
   }
 };
 
@@ -229,8 +232,8 @@ TEST_P(ListDeviceSpritesOf, HasTheTilesOfTheCpu) {
   for (const int tile_size : {8, 64, 128}) {
     const TileLists expected = ListTiles(rects, cloud.target.size, tile_size);
     const DeviceTiles uploaded = UploadTiles(expected);
-    const absl::StatusOr<DeviceTiles> lists =
-        ListDeviceTiles(Device(), *sprites, {0, sprites->count}, cloud.target.size, tile_size);
+    const absl::StatusOr<DeviceTiles> lists = ListDeviceTiles(
+        Device(), sprites->rects, {0, sprites->count}, cloud.target.size, tile_size);
     ASSERT_TRUE(lists.ok()) << lists.status();
     EXPECT_EQ(lists->tiles, uploaded.tiles);
     EXPECT_EQ(lists->tile_size, tile_size);
@@ -259,7 +262,7 @@ TEST_F(DeviceListsTest, OfRunsTogetherAreTheTilesOfAll) {
   const size_t ends[] = {0, 1, 33, 33, 7001, list.rects.size()};
   for (size_t r = 0; r + 1 < std::size(ends); ++r) {
     const absl::StatusOr<DeviceTiles> run =
-        ListDeviceTiles(Device(), sprites, {ends[r], ends[r + 1]}, kSize, 8);
+        ListDeviceTiles(Device(), sprites.rects, {ends[r], ends[r + 1]}, kSize, 8);
     ASSERT_TRUE(run.ok()) << run.status();
     const auto begin = test::ReadBuffer<uint32_t>(run->begin, tiles + 1);
     const auto places = test::ReadBuffer<uint32_t>(run->entries, run->entry_count);
@@ -277,15 +280,51 @@ TEST_F(DeviceListsTest, OfRunsTogetherAreTheTilesOfAll) {
   }
 }
 
+// Together the order, each within its limits and with as many entries as its lists turn out to
+// have.
+TEST_F(DeviceListsTest, AreCutIntoRunsThatTellTheirEntries) {
+  const Cloud cloud = CloudFrom({1, 2, 4});
+  const SpriteList list = ListSprites(ParticleView(cloud.scene), cloud.target);
+  const DeviceSprites sprites = UploadSprites(list);
+  for (const size_t most : {size_t{1}, size_t{1000}, list.rects.size()}) {
+    const auto runs = CutIntoListedRuns(Device(), sprites, 8, most);
+    ASSERT_TRUE(runs.ok()) << runs.status();
+    size_t end = 0;
+    for (const ListedRun& run : *runs) {
+      EXPECT_EQ(run.places.first, end);
+      EXPECT_LE(run.places.end - run.places.first, std::max<size_t>(most, shader::kScanGroupSize));
+      end = run.places.end;
+      const std::span<const Rect> rects(list.rects);
+      const auto of_run = rects.subspan(run.places.first, end - run.places.first);
+      ASSERT_EQ(run.entries, ListTiles(of_run, kSize, 8).entries.size());
+    }
+    EXPECT_EQ(end, list.rects.size());
+  }
+  for (const size_t entries : {size_t{700}, size_t{40'000}}) {
+    const auto patches = CutIntoPatchRuns(Device(), sprites, 16, {.entries = entries});
+    ASSERT_TRUE(patches.ok()) << patches.status();
+    size_t end = 0;
+    for (const PatchRun& run : patches->runs) {
+      EXPECT_EQ(run.places.first, end);
+      EXPECT_LE(run.entries, entries);
+      end = run.places.end;
+      const std::span<const Rect> rects(list.rects);
+      const auto of_run = rects.subspan(run.places.first, end - run.places.first);
+      ASSERT_EQ(run.entries, ListTiles(of_run, kSize, 16).entries.size());
+    }
+    EXPECT_EQ(end, list.rects.size());
+  }
+}
+
 TEST_F(DeviceListsTest, AreTheSameEveryTime) {
   const Cloud cloud = CloudFrom({0.3, 0.2, 0.9});
   const ParticleView particles(cloud.scene);
   const ParticleBuffers buffers = UploadParticles(particles);
   std::vector<uint32_t> first;
   for (int repeat = 0; repeat < 5; ++repeat) {
-    const auto sprites = ListDeviceSprites(Device(), buffers, glm::dvec3(0.0), cloud.target);
+    const auto sprites = ListDeviceSprites(Device(), buffers, particles, cloud.target);
     ASSERT_TRUE(sprites.ok()) << sprites.status();
-    const auto tiles = ListDeviceTiles(Device(), *sprites, {0, sprites->count}, kSize, 8);
+    const auto tiles = ListDeviceTiles(Device(), sprites->rects, {0, sprites->count}, kSize, 8);
     ASSERT_TRUE(tiles.ok()) << tiles.status();
     auto entries = test::ReadBuffer<uint32_t>(tiles->entries, tiles->entry_count);
     if (repeat == 0) first = entries;
@@ -300,7 +339,7 @@ TEST_F(DeviceListsTest, NamesTheLimitThatTooManyEntriesExceed) {
   list.sprites.resize(2000);
   list.rects.resize(2000, {0, 65535, 0, 65535});
   const absl::Status status =
-      ListDeviceTiles(Device(), UploadSprites(list), {0, 2000}, {65535, 65535}, 32).status();
+      ListDeviceTiles(Device(), UploadSprites(list).rects, {0, 2000}, {65535, 65535}, 32).status();
   EXPECT_EQ(status.code(), absl::StatusCode::kResourceExhausted);
   EXPECT_NE(status.message().find("GL_MAX_SHADER_STORAGE_BLOCK_SIZE"), std::string::npos) << status;
 }
@@ -312,7 +351,7 @@ TEST_F(DeviceListsTest, ListAParticleOverAsManyTilesAsThereAre) {
   list.particles = {0, 1, 2};
   list.sprites.resize(3);
   list.rects = {{5, 6, 9, 10}, {0, 4096, 0, 4000}, {}};
-  const auto tiles = ListDeviceTiles(Device(), UploadSprites(list), {0, 3}, kLarge, 8);
+  const auto tiles = ListDeviceTiles(Device(), UploadSprites(list).rects, {0, 3}, kLarge, 8);
   ASSERT_TRUE(tiles.ok()) << tiles.status();
   const TileLists expected = ListTiles(list.rects, kLarge, 8);
   ASSERT_EQ(tiles->entry_count, size_t{512} * 500 + 1);

@@ -117,6 +117,9 @@ absl::Status CompositePlaces(Gpu& gpu, const Scene& scene, const TargetProjectio
     if (!program.ok()) return program.status();
 
     shader::TileCompositeBlock block = DescribeComposite(scene, layout, show);
+    block.tiles = {targets.first_tile, tiles.tiles.x, 0};
+    const glm::ivec2 size(show.target.width(), show.target.height());
+    const glm::ivec2 groups = (size + (walk.tile_size - 1)) / walk.tile_size;
     const size_t step =
         size_t{std::max(walk.most_iterations / chunk.iterations, 1U)} * chunk.particles;
     for (size_t first = 0; first < longest; first += step) {
@@ -132,7 +135,7 @@ absl::Status CompositePlaces(Gpu& gpu, const Scene& scene, const TargetProjectio
       gl::BindStorage(shader::kTileEntriesBinding, tiles.entries);
       glBindImageTexture(shader::kTileTargetBinding, show.target.name(), 0, GL_FALSE, 0,
                          GL_READ_WRITE, GL_RGBA32F);
-      glDispatchCompute(static_cast<GLuint>(tiles.tiles.x), static_cast<GLuint>(tiles.tiles.y), 1);
+      glDispatchCompute(static_cast<GLuint>(groups.x), static_cast<GLuint>(groups.y), 1);
       glMemoryBarrier(GL_SHADER_IMAGE_ACCESS_BARRIER_BIT);
     }
   }

@@ -31,20 +31,22 @@ struct TileWalk {
 // devices get 16 x 16, so that a particle is loaded less often; no figures of any are known yet.
 TileWalk TileWalkFor(const DeviceInfo& device);
 
-// Textures of the target's size, premultiplied R G B A, with nothing in them.
+// Textures of the size of a part of the image, premultiplied R G B A.
 struct TileTargets {
+  glm::ivec2 first_tile{0};  // with which the part begins; it ends with one, or with the image
   gl::Texture beauty;
   gl::Texture depth;                       // depth * alpha, 0, 0, alpha; empty unless wanted
   std::vector<gl::Texture> transmittance;  // by slot: R G B * alpha, alpha; empty unless wanted
 };
 
-// `transmittance` has the slots that an output shows.
+// With nothing in them. `transmittance` has the slots that an output shows.
 TileTargets MakeTileTargets(const glm::ivec2& size, const ShadedLayout& layout,
                             const std::vector<int>& transmittance);
 
 // Composites the particles of `shaded` behind what the targets hold. `tiles` are the lists of the
 // same run, with tiles as large as the walk's. Sums, bounds and formulas are those of
-// CompositeTiles. Cancelled when `stop` says so. Needs a current context.
+// CompositeTiles. What part of the image the targets are makes no difference to a pixel. Cancelled
+// when `stop` says so. Needs a current context.
 absl::Status CompositePlaces(Gpu& gpu, const Scene& scene, const TargetProjection& eye,
                              const ShadedLayout& layout, const ShadedPlaces& shaded,
                              const DeviceTiles& tiles, const TileWalk& walk,

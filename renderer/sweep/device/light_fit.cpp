@@ -78,7 +78,8 @@ absl::Status SweepAndFit(Gpu& gpu, const LightPasses& passes, const TargetProjec
   for (const PatchRun& run : passes.patch_runs.runs) {
     if (stop.stop_requested()) return absl::CancelledError("frame cancelled");
     absl::StatusOr<DeviceTiles> tiles =
-        ListDeviceTiles(gpu, passes.sprites, run.places, target.projection.size, passes.light_tile);
+        ListDeviceTiles(gpu, passes.sprites.rects, run.places, target.projection.size,
+                        passes.light_tile, run.entries);
     if (!tiles.ok()) return tiles.status();
     const gl::Buffer block = BindRun(run, target.projection.size.x);
     glBindBufferBase(GL_UNIFORM_BUFFER, shader::kProjectionBinding, target.block.name());
@@ -102,6 +103,11 @@ absl::Status CheckSizes(size_t particles, size_t texels, int degree) {
 
 }  // namespace
 
+size_t DeviceLightFit::bytes() const {
+  const auto texels = static_cast<size_t>(projection.size.x) * projection.size.y;
+  return (count * (Terms(degree) + 4) + texels) * sizeof(float);
+}
+
 LightSweepSettings LightSweepSettingsFor(const DeviceInfo& device) {
   LightSweepSettings settings;
   if (!device.software) settings.limits = kLongRuns;
@@ -123,11 +129,13 @@ absl::StatusOr<DeviceLightFit> FitLightOnDevice(Gpu& gpu, const Light& light,
   DeviceLightFit fit;
   fit.projection = LightProjection(light, particles, light_buffer_size, 0.0);
   fit.degree = degree;
+  fit.count = particles.size();
   const TargetProjection target = UploadProjection(fit.projection, particles);
   absl::StatusOr<DeviceSprites> sprites =
-      ListDeviceSprites(gpu, buffers, particles.set().origin, fit.projection);
+      ListDeviceSprites(gpu, buffers, particles, fit.projection);
   if (!sprites.ok()) return sprites.status();
-  absl::StatusOr<PatchRuns> runs = CutIntoPatchRuns(gpu, *sprites, settings.limits);
+  absl::StatusOr<PatchRuns> runs =
+      CutIntoPatchRuns(gpu, *sprites, settings.light_tile, settings.limits);
   if (!runs.ok()) return runs.status();
 
   // Make what the passes write.
@@ -165,15 +173,9 @@ absl::StatusOr<DeviceLightFit> FitLightOnDevice(Gpu& gpu, const Light& light,
   return fit;
 }
 
-Image ReadOpticalDepth(const DeviceLightFit& fit) {
-  const glm::ivec2 size = fit.projection.size;
-  Image image{size.x, size.y, 1, {"Y"}, {}};
-  image.pixels.resize(static_cast<size_t>(size.x) * size.y);
-  glMemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
-  glGetNamedBufferSubData(fit.optical_depth.name(), 0,
-                          static_cast<GLsizeiptr>(image.pixels.size() * sizeof(float)),
-                          image.pixels.data());
-  return image;
+void ReadOpticalDepth(const DeviceLightFit& fit, Readback& readback, Image& image) {
+  image = {fit.projection.size.x, fit.projection.size.y, 1, {"Y"}, {}};
+  readback.Copy(fit.optical_depth, image);
 }
 
 }  // namespace halflight::sweep

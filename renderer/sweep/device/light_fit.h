@@ -10,7 +10,7 @@
 // What limits it: the first pass has as many invocations as the light buffer has texels, 65,536 for
 // 256 x 256, which do not fill a large GPU, and ends with its longest tile; smaller tiles shorten
 // that one. Memory traffic is 8 bytes a fragment of the light, written and read once, and 32 bytes
-// an entry of a tile. Every run waits for the device, to list its tiles.
+// an entry of a tile. The frame waits for the device once a light, to cut it into runs.
 //
 // Memory on the device, at degree d: 48 bytes a particle and 4 more for each of its
 // (d + 1) (d + 2) / 2 coefficients, of which 16 and the coefficients stay; 4 for each texel of a
@@ -26,9 +26,10 @@
 #include "renderer/image.h"
 #include "renderer/particle_view.h"
 #include "renderer/projection.h"
+#include "renderer/readback.h"
 #include "renderer/scene.h"
 #include "renderer/sweep/device/lists.h"
-#include "renderer/sweep/device/patch_runs.h"
+#include "renderer/sweep/device/runs.h"
 
 namespace halflight::sweep {
 
@@ -39,6 +40,10 @@ struct DeviceLightFit {
   gl::Buffer depth;          // float[Terms(degree) * N], by particle
   gl::Buffer sprites;        // vec4[N], by particle, as Sprite
   gl::Buffer optical_depth;  // float[size * size], row by row: behind all particles
+  size_t count = 0;          // N
+
+  // On the device.
+  [[nodiscard]] size_t bytes() const;
 };
 
 struct LightSweepSettings {
@@ -58,7 +63,8 @@ absl::StatusOr<DeviceLightFit> FitLightOnDevice(Gpu& gpu, const Light& light,
                                                 const std::stop_token& stop,
                                                 const LightSweepSettings& settings = {});
 
-// The optical depth behind all particles, as LightFit has it. Waits for the device.
-Image ReadOpticalDepth(const DeviceLightFit& fit);
+// The optical depth behind all particles, as LightFit has it: what `image` becomes once what
+// `readback` reads has arrived.
+void ReadOpticalDepth(const DeviceLightFit& fit, Readback& readback, Image& image);
 
 }  // namespace halflight::sweep

@@ -1,8 +1,13 @@
 // Keys, their sort, and projections, in compute.
 #include <algorithm>
+#include <atomic>
+
+#include <glm/geometric.hpp>
+#include <glm/gtc/matrix_access.hpp>
 
 #include "renderer/gl/compute.h"
 #include "renderer/gl/debug.h"
+#include "renderer/parallel.h"
 #include "renderer/passes/sort_keys.h"
 #include "renderer/sweep/device/lists.h"
 #include "shaders/bindings.h"
@@ -44,29 +49,45 @@ void BindParticles(const ParticleBuffers& particles) {
   gl::BindStorage(shader::kRadiiBinding, particles.radii);
 }
 
-struct DepthKeys {
-  gl::Buffer keys;
-  bool any_near;
-};
+// Whether any particle is near, or so nearly so that rounding may tell otherwise; as ListSprites
+// has it. What most frames have none of takes no memory in them, and none waits for the device to
+// tell.
+bool AnyNear(const ParticleView& particles, const Projection& target, double near_depth) {
+  constexpr double kSlack = 1.0 + 1e-6;
+  const double depth = kSlack * std::max(near_depth, kLeastNearDepth);
+  if (target.orthographic || particles.size() == 0) return false;
+  const glm::dvec3 forward = -glm::dvec3(glm::row(target.view_from_world, 2));
+  const glm::dvec3 origin_from_eye = particles.set().origin - target.eye();
+  const double enlarged = depth * target.least_radius;  // of w: what small particles come to
+  const OffsetBounds& bounds = particles.bounds();
+  const double least_depth = glm::dot(forward, bounds.center() + origin_from_eye) -
+                             glm::dot(glm::abs(forward), (bounds.high - bounds.low) * 0.5);
+  if (enlarged < 1.0 && least_depth > depth * particles.largest_radius()) return false;
 
-absl::StatusOr<DepthKeys> MakeKeys(Gpu& gpu, const ParticleBuffers& particles,
-                                   const gl::Constants& constants,
-                                   const shader::SpriteTargetBlock& block, bool orthographic) {
+  std::atomic<bool> any = false;
+  ParallelRanges(particles.size(), [&](const WorkRange& range) {
+    for (size_t i = range.begin; i < range.end && !any; ++i) {
+      const double w = glm::dot(forward, glm::dvec3(particles.positions()[i]) + origin_from_eye);
+      if (w <= depth * particles.radius(i) || (w > 0.0 && enlarged >= 1.0)) any = true;
+    }
+  });
+  return any;
+}
+
+absl::StatusOr<gl::Buffer> MakeKeys(Gpu& gpu, const ParticleBuffers& particles,
+                                    const gl::Constants& constants,
+                                    const shader::SpriteTargetBlock& block) {
   const absl::StatusOr<GLuint> program = gpu.programs.Get(KeysProgram(), constants);
   if (!program.ok()) return program.status();
-  DepthKeys made{gl::MakeBuffer("sprite keys", particles.count * sizeof(uint32_t)), false};
-  const gl::Buffer any_near = gl::MakeBlock("any near sprite", uint32_t{0});
+  gl::Buffer keys = gl::MakeBuffer("sprite keys", particles.count * sizeof(uint32_t));
   const gl::Buffer uniforms = gl::MakeBlock("sprite target", block);
   glUseProgram(*program);
   glBindBufferBase(GL_UNIFORM_BUFFER, shader::kSpriteTargetBinding, uniforms.name());
   BindParticles(particles);
-  gl::BindStorage(shader::kSpriteKeysBinding, made.keys);
-  gl::BindStorage(shader::kAnyNearBinding, any_near);
+  gl::BindStorage(shader::kSpriteKeysBinding, keys);
   gl::DispatchGroups(gl::DivideUp(particles.count, shader::kListGroupSize));
   glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
-  // Waits for the device, so that what most frames have none of takes no memory in them.
-  made.any_near = !orthographic && gl::ReadWord(any_near, 0) != 0;
-  return made;
+  return keys;
 }
 
 absl::Status Project(Gpu& gpu, const ParticleBuffers& particles, gl::Constants constants,
@@ -100,31 +121,31 @@ absl::Status Project(Gpu& gpu, const ParticleBuffers& particles, gl::Constants c
 
 }  // namespace
 
-absl::StatusOr<DeviceSprites> ListDeviceSprites(Gpu& gpu, const ParticleBuffers& particles,
-                                                const glm::dvec3& origin, const Projection& target,
-                                                double near_depth) {
+absl::StatusOr<DeviceSprites> ListDeviceSprites(Gpu& gpu, const ParticleBuffers& buffers,
+                                                const ParticleView& particles,
+                                                const Projection& target, double near_depth) {
   const gl::DebugScope scope("list sprites");
-  if (absl::Status status = gl::CheckStorageBlock("positions", particles.count * sizeof(glm::vec3));
+  if (absl::Status status = gl::CheckStorageBlock("positions", buffers.count * sizeof(glm::vec3));
       !status.ok()) {
     return status;
   }
   const gl::Constants constants = {{shader::kOrthographicConstant, target.orthographic},
-                                   {shader::kHasRadiiConstant, particles.has_radii}};
-  const shader::SpriteTargetBlock block = BlockOf(target, origin, near_depth);
-  absl::StatusOr<DepthKeys> keys = MakeKeys(gpu, particles, constants, block, target.orthographic);
+                                   {shader::kHasRadiiConstant, buffers.has_radii}};
+  const shader::SpriteTargetBlock block = BlockOf(target, particles.set().origin, near_depth);
+  absl::StatusOr<gl::Buffer> keys = MakeKeys(gpu, buffers, constants, block);
   if (!keys.ok()) return keys.status();
   absl::StatusOr<KeyedValues> sorted =
-      SortKeys(gpu, {std::move(keys->keys), gl::Buffer()}, particles.count);
+      SortKeys(gpu, {*std::move(keys), gl::Buffer()}, buffers.count);
   if (!sorted.ok()) return sorted.status();
 
   DeviceSprites list;
-  list.count = particles.count;
+  list.count = buffers.count;
   list.particles = std::move(sorted->values);
   list.sprites = gl::MakeBuffer("sprites", list.count * sizeof(glm::vec4));
   list.rects = gl::MakeBuffer("sprite rectangles", list.count * sizeof(glm::uvec2));
-  list.has_near = keys->any_near;
+  list.has_near = AnyNear(particles, target, near_depth);
   if (list.has_near) list.near = gl::MakeBuffer("near sprites", list.count * sizeof(glm::vec4));
-  if (absl::Status status = Project(gpu, particles, constants, block, list); !status.ok()) {
+  if (absl::Status status = Project(gpu, buffers, constants, block, list); !status.ok()) {
     return status;
   }
   return list;

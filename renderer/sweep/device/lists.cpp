@@ -12,6 +12,16 @@ namespace halflight::sweep {
 static_assert(sizeof(Sprite) == sizeof(glm::vec4));
 static_assert(sizeof(Rect) == sizeof(glm::uvec2) && std::endian::native == std::endian::little);
 
+size_t DeviceSprites::bytes() const {
+  return count * (sizeof(uint32_t) + sizeof(glm::vec4) + sizeof(glm::uvec2) +
+                  (has_near ? sizeof(glm::vec4) : 0));
+}
+
+size_t DeviceTiles::bytes() const {
+  const auto tile_count = static_cast<size_t>(tiles.x) * static_cast<size_t>(tiles.y);
+  return (tile_count + 1 + entry_count) * sizeof(uint32_t);
+}
+
 DeviceSprites UploadSprites(const SpriteList& list) {
   DeviceSprites device;
   device.count = list.particles.size();
