@@ -12,7 +12,6 @@
 #include <CLI/CLI.hpp>
 
 #include "absl/strings/numbers.h"
-#include "absl/strings/strip.h"
 #include "renderer/scene.h"
 #include "server/convert/field_checks.h"
 #include "server/version.h"
@@ -235,14 +234,13 @@ absl::Status Check(const Options& options) {
 
 // CLI11 does not say whether a wrong value stood in the file, so that both are named.
 std::string ParseMessage(const CLI::ParseError& error, const std::string& config_file) {
-  constexpr absl::string_view kUnknown = "INI was not able to parse ";
-  absl::string_view what = error.what();
-  if (absl::ConsumePrefix(&what, kUnknown)) {
+  const std::string what = error.what();
+  const std::string unknown = "INI was not able to parse ";
+  if (what.rfind(unknown, 0) == 0) {
     return fmt::format("{}: {}: is no flag, allowed: those that --help lists, without dashes",
-                       config_file, std::string(what));
+                       config_file, what.substr(unknown.size()));
   }
-  return config_file.empty() ? std::string(what)
-                             : fmt::format("{} (given, or in {})", std::string(what), config_file);
+  return config_file.empty() ? what : fmt::format("{} (given, or in {})", what, config_file);
 }
 
 }  // namespace
