@@ -164,7 +164,7 @@ absl::StatusOr<v1::QueryUploadResponse> Client::Impl::QueryUpload(
     const std::stop_token& stop) {
   grpc::ClientContext query;
   query.set_deadline(context.deadline());
-  SetRoute(query, route);
+  SetMetadata(query, route, options_.security.token);
   const std::stop_callback cancel(stop, [&query] { query.TryCancel(); });
   v1::QueryUploadRequest request;
   request.set_sha256(sha256);
