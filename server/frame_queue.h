@@ -20,13 +20,13 @@ namespace halflight {
 // One rendering of a frame that waits. Its timings begin with "queue", the time until the engine
 // began it.
 struct QueuedFrame {
-  std::string client;
+  std::string client{};
   int priority = 0;      // among the frames of its client: higher goes first
   bool goes_on = false;  // of a frame that was rendered before: before all others of its client
-  FrameRequest request;
-  std::stop_token stop;
-  std::function<void()> begun;  // when its turn has come; may be empty
-  FrameEngine::Done done;
+  FrameRequest request{};
+  std::stop_token stop{};
+  std::function<void()> begun{};  // when its turn has come; may be empty
+  FrameEngine::Done done{};
 };
 
 // The next frame is that of the client which has had the renderer for the shortest time of late
