@@ -99,9 +99,10 @@ class AccessTest : public ::testing::Test {
   std::string version_ = "1";
   ParticleStore store_{1 << 20};
   ByteBudget upload_memory_{1 << 20};
+  PartialUploads partial_uploads_{upload_memory_, {}};
   FramePipeline pipeline_{engine_,
                           {.max_queued_frames = 8, .encode_threads = 2, .encode = EncodePlain}};
-  Backend backend_{engine_.device(), limits_, version_, store_, upload_memory_, pipeline_};
+  Backend backend_{engine_.device(), limits_, version_, store_, partial_uploads_, pipeline_};
   std::unique_ptr<Access> access_;
   std::unique_ptr<GrpcServer> server_;
   std::string address_;
