@@ -133,8 +133,10 @@ TEST_F(Killed, ServerAtAnyMomentLeavesWholeSetsOrNone) {
       }
     }
     std::jthread client_thread([&, order = Below(sets.size())] {
-      auto client =
-          client::Client::Connect(address, {.timeout = std::chrono::seconds(1), .max_attempts = 1});
+      client::ClientOptions once;
+      once.timeout = std::chrono::seconds(1);
+      once.max_attempts = 1;
+      auto client = client::Client::Connect(address, once);
       for (size_t i = 0; i < sets.size(); ++i) {
         client->EnsureUploaded(sets[(i + order) % sets.size()]).IgnoreError();
       }
@@ -226,7 +228,7 @@ TEST_F(Killed, ServerSaysWhyItCannotUseItsCacheDirectory) {
   const std::string cache = folder_ / "cache";
   const Process first(folder_, "halflightd_fake",
                       {"--address", "127.0.0.1:0", "--cache-dir", cache});
-  first.Address();
+  ASSERT_FALSE(first.Address().empty());
   struct Case {
     std::vector<std::string> flags;
     int code;
