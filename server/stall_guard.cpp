@@ -8,7 +8,8 @@ namespace halflight {
 
 // What the timer's call may still hold when the guard and its context are gone.
 struct StallGuard::Call {
-  std::mutex mutex;
+  // Recursive: gRPC may end the call, and with it the guard, before TryCancel returns.
+  std::recursive_mutex mutex;
   grpc::CallbackServerContext* context;  // null: gone
 };
 

@@ -13,8 +13,8 @@ Timer::~Timer() {
 Timer::Ticket Timer::At(Clock::time_point time, std::function<void()> call) {
   const std::lock_guard lock(mutex_);
   const Ticket ticket{time, next_++};
-  const bool earliest = calls_.emplace(ticket, std::move(call)).first == calls_.begin();
-  if (earliest) {
+  const auto place = calls_.emplace(ticket, std::move(call)).first;
+  if (place == calls_.begin()) {
     changed_.notify_all();
   }
   return ticket;

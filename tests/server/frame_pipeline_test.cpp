@@ -46,9 +46,10 @@ TEST_F(Pipeline, FrameHoldsEveryOutputInOrder) {
   EXPECT_EQ(frame.header.metadata().server_version(), "1.2.3");
   EXPECT_EQ(frame.header.metadata().gl_renderer(), "fake");
   EXPECT_EQ(frame.header.plan().passes(0).name(), "pretend");
-  EXPECT_EQ(frame.header.timings(0).stage(), "composite");
-  EXPECT_EQ(frame.header.timings(1).stage(), "encode");
-  EXPECT_EQ(frame.header.timings(2).stage(), "total");
+  EXPECT_EQ(frame.header.timings(0).stage(), "queue");
+  EXPECT_EQ(frame.header.timings(1).stage(), "composite");
+  EXPECT_EQ(frame.header.timings(2).stage(), "encode");
+  EXPECT_EQ(frame.header.timings(3).stage(), "total");
 }
 
 TEST_F(Pipeline, MakesRequestIdsThatDiffer) {

@@ -1,6 +1,7 @@
 #include "server/timer.h"
 
 #include <future>
+#include <thread>
 #include <vector>
 
 #include <gmock/gmock.h>
@@ -23,6 +24,15 @@ TEST(Timer, CallsInTheOrderOfTimesWhateverTheOrderOfAsking) {
   timer.At(now + milliseconds(40), [&] { called.push_back(3); });
   last.get_future().wait();
   EXPECT_THAT(called, ::testing::ElementsAre(1, 2, 3));
+}
+
+TEST(Timer, CallsTheOnlyOneThereIs) {
+  std::promise<void> called;
+  Timer timer;
+  // Until the timer waits for whatever may come.
+  std::this_thread::sleep_for(milliseconds(20));
+  timer.At(Timer::Clock::now(), [&] { called.set_value(); });
+  EXPECT_EQ(called.get_future().wait_for(std::chrono::seconds(10)), std::future_status::ready);
 }
 
 TEST(Timer, CancelledCallNeverComes) {
