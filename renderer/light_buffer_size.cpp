@@ -89,7 +89,10 @@ int LightBufferSizeFor(const Scene& scene, const ParticleView& particles) {
 }
 
 int LargestLightBufferSize(const ShadowSettings& shadow, ShadowTechniqueKind technique) {
-  if (shadow.light_buffer_size > 0) return shadow.light_buffer_size;
+  // The reference has no light buffer.
+  if (shadow.light_buffer_size > 0 || technique == ShadowTechniqueKind::kReference) {
+    return shadow.light_buffer_size;
+  }
   return std::min(IsSizedByParticles(technique) ? kMostSize : kSlicedSize,
                   shadow.max_light_buffer_size);
 }

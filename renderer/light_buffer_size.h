@@ -10,9 +10,9 @@ namespace halflight {
 // as let a typical particle's radius take five and a half of them, as the light sees it for which
 // that takes most. Typical is the radius below which particles hold a tenth of the cloud's optical
 // depth times area. A multiple of 64 from 64 to 1024, and no more than is allowed. That is what the
-// light sweep and the particle shadow map can use; other techniques get 512. docs/target-error.md
-// has the measurement. Any thread; deterministic. Goes over all particles once for each light that
-// casts shadows.
+// light sweep and the particle shadow map can use; slicing gets 512, the reference none.
+// docs/target-error.md has the measurement. Any thread; deterministic. Goes over all particles once
+// for each light that casts shadows.
 int LightBufferSizeFor(const Scene& scene, const ParticleView& particles);
 
 // The most that it gives for these settings under a technique, whatever the particles.

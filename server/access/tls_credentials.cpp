@@ -28,9 +28,10 @@ class TlsMaterial {
       return GRPC_SSL_CERTIFICATE_CONFIG_RELOAD_UNCHANGED;
     }
     const grpc_ssl_pem_key_cert_pair pair{files->key.c_str(), files->certificate.c_str()};
-    const char* const authorities =
-        files->client_authorities.empty() ? nullptr : files->client_authorities.c_str();
-    *config = grpc_ssl_server_certificate_config_create(authorities, &pair, 1);
+    // gRPC 1.51 fails an assertion without any, though it asks no client for a certificate then.
+    const std::string& authorities =
+        files->client_authorities.empty() ? files->certificate : files->client_authorities;
+    *config = grpc_ssl_server_certificate_config_create(authorities.c_str(), &pair, 1);
     return GRPC_SSL_CERTIFICATE_CONFIG_RELOAD_NEW;
   }
 

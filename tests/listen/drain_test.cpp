@@ -61,6 +61,7 @@ TEST(Drain, LeavesTheSocketOfTheServerThatFollowsAlone) {
   const std::string hold = folder.Write("hold", "");
   const std::string socket = "unix:" + folder / "socket";
   Daemon first(folder, {"--address", socket, "--device", hold});
+  ASSERT_FALSE(first.Address().empty());
   auto client = client::Client::Connect(socket);
   ASSERT_TRUE(client.ok());
   std::jthread call([&] { EXPECT_TRUE(client->RenderFrame(MakeRequest()).ok()); });
@@ -72,7 +73,7 @@ TEST(Drain, LeavesTheSocketOfTheServerThatFollowsAlone) {
   const std::string address = second.Address();
   std::filesystem::remove(hold);
   call.join();
-  EXPECT_EQ(first.Wait(), 0);
+  EXPECT_EQ(first.Wait(), 0) << first.Err();
   EXPECT_TRUE(std::filesystem::exists(folder / "socket"));
   EXPECT_EQ(Health(NewChannel(socket)), kServing);
 }

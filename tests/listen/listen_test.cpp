@@ -101,8 +101,12 @@ TEST_F(AcceptorTest, BeyondTheLimitHangsUpUntilOthersAreGone) {
   EXPECT_TRUE(Connect().HangsUpWithin(10000));
   EXPECT_EQ(served_.size(), 3U);
   served_.DropAll();
-  const ClientSocket again = Connect();
-  EXPECT_TRUE(WaitFor([this] { return served_.size() == 1; }));
+  // Those that come while it still believes a count of some milliseconds ago are turned away.
+  std::vector<ClientSocket> again;
+  EXPECT_TRUE(WaitFor([&] {
+    again.push_back(Connect());
+    return served_.size() > 0;
+  }));
 }
 
 // As long as this lives there is no descriptor left in this process.

@@ -180,6 +180,7 @@ TEST_F(Killed, ServerAtAnyMomentLeavesWholeSetsOrNone) {
     Process restarted(folder_, "halflightd_fake", {"--address", address, "--cache-dir", cache});
     auto client = client::Client::Connect(address, options);
     v1::RenderFrameRequest request = testing::MakeRequest();
+    request.mutable_scene()->mutable_material()->set_radius(0.1F);
     request.mutable_scene()->set_particle_sha256(large.sha256);
     if (sequence) {
       status = client->RenderSequence(
@@ -217,6 +218,7 @@ TEST_F(Killed, DamagedSetIsSentAgainByTheClientWithoutAWord) {
   const Process server(folder_, "halflightd_fake", flags);
   auto client = client::Client::Connect(address);
   v1::RenderFrameRequest request = testing::MakeRequest();
+  request.mutable_scene()->mutable_material()->set_radius(0.1F);
   const auto frame = client->RenderFrame(request, &particles);
   ASSERT_TRUE(frame.ok()) << frame.status();
   EXPECT_THAT(server.Err(), HasSubstr("is missing now: its SHA-256 is"));
