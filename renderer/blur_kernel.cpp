@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include <glm/common.hpp>
+
 #include "shaders/bindings.h"
 
 namespace halflight {
@@ -19,6 +21,19 @@ std::vector<float> DiscreteGaussian(double variance) {
   normalized.reserve(weights.size());
   for (const double weight : weights) normalized.push_back(static_cast<float>(weight / sum));
   return normalized;
+}
+
+std::vector<BlurStep> BlurSteps(const glm::dvec3& variance, int size) {
+  std::vector<BlurStep> steps;
+  // Light spread further than the buffer is wide is the same everywhere.
+  glm::dvec3 left = glm::clamp(variance, 0.0, std::pow(size, 2));
+  for (uint32_t stride = 1; left.r > 0.0 || left.g > 0.0 || left.b > 0.0; stride *= 4) {
+    const double squared_stride = stride * stride;
+    const glm::dvec3 now = glm::min(left, glm::dvec3(kMaxBlurVariance * squared_stride));
+    steps.push_back({stride, now / squared_stride});
+    left -= now;
+  }
+  return steps;
 }
 
 }  // namespace halflight

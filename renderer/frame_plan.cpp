@@ -1,6 +1,9 @@
 #include "renderer/frame_plan.h"
 
+#include <algorithm>
+
 #include "renderer/frame.h"
+#include "renderer/light_buffer_size.h"
 #include "renderer/shadow_technique.h"
 
 namespace halflight {
@@ -23,6 +26,20 @@ glm::ivec2 CompositeSize(const PixelRect& window, const Sampling& sampling) {
   return (pixels * sampling.supersample + (sampling.downsample - 1)) / sampling.downsample;
 }
 
+Traversal PlanLightBuffer(const Scene& scene, const ParticleView& particles, int light) {
+  Traversal traversal;
+  traversal.shadow_light = light;
+  traversal.slices = static_cast<int>(
+      std::clamp<size_t>(particles.size(), 1, static_cast<size_t>(scene.shadow.slices)));
+  traversal.spacing = scene.shadow.spacing;
+  traversal.light_buffer_size = LightBufferSizeFor(scene, particles);
+  traversal.blur = scene.scatters();
+  traversal.keep_unscattered = traversal.blur && scene.material.physical_scattering;
+  traversal.colored_light_buffer =
+      traversal.blur && scene.lights[static_cast<size_t>(light)].colored_density();
+  return traversal;
+}
+
 absl::StatusOr<FramePlan> PlanFrame(const FrameRequest& request, const ParticleView& particles) {
   const Scene& scene = request.scene;
   for (const ImageRequest& image : request.images) {
@@ -37,6 +54,7 @@ absl::StatusOr<FramePlan> PlanFrame(const FrameRequest& request, const ParticleV
   plan.keep_depth = Shows(request, ImageKind::kDepth);
   const ShadowTechnique& technique = TechniqueFor(scene.shadow.technique);
   if (absl::Status status = technique.Check(request); !status.ok()) return status;
+  plan.light_buffer_size = LightBufferSizeFor(scene, particles);
   if (absl::Status status = technique.Plan(request, particles, plan); !status.ok()) return status;
   DescribeSampling(scene.sampling, plan);
   return plan;

@@ -30,6 +30,7 @@ struct Traversal {
   bool back_to_front = false;
   int slices = 1;
   bool interpolate = false;
+  bool in_tiles = false;  // composited in compute, not through the blend units
   SliceSpacing spacing = SliceSpacing::kEqualCount;
 
   int light_buffer_size = 0;          // texels along each side; 0: no light buffer
@@ -52,15 +53,22 @@ struct PlannedPass {
 };
 
 struct FramePlan {
-  glm::ivec2 window_size{0};          // pixels of the image
-  glm::ivec2 composite_size{0};       // pixels composited, after super- or downsampling
-  bool keep_depth = false;            // an output shows it; drawn by the first traversal
-  std::vector<Traversal> traversals;  // at least one, but for the reference: none
-  std::vector<PlannedPass> passes;    // what the above comes to, for people
+  glm::ivec2 window_size{0};     // pixels of the image
+  glm::ivec2 composite_size{0};  // pixels composited, after super- or downsampling
+  int light_buffer_size = 0;     // texels along each side of all light buffers, if any
+  bool keep_depth = false;       // an output shows it; drawn by the first traversal
+  // Of slicing at least one; of the light sweep and the particle shadow map one for each light that
+  // casts shadows; of the reference none.
+  std::vector<Traversal> traversals;
+  std::vector<PlannedPass> passes;  // what the above comes to, for people
 };
 
 // Samples composited for a window of the image.
 glm::ivec2 CompositeSize(const PixelRect& window, const Sampling& sampling);
+
+// What the walk of a light that casts shadows is before its technique gives it an axis: slices, of
+// which there are no more than particles, and a light buffer.
+Traversal PlanLightBuffer(const Scene& scene, const ParticleView& particles, int light);
 
 // `particles` is the view of request.scene. Fails with InvalidArgument, naming the field, where the
 // scene asks for what its technique cannot do.

@@ -53,6 +53,9 @@ absl::StatusOr<std::unique_ptr<FrameRenderer::Begun>> FrameRenderer::Begin(Frame
                                                                            std::stop_token stop) {
   auto frame = std::make_unique<Begun>();
   frame->request = std::move(request);
+  // What the request leaves to the device.
+  SliceCompositor& compositor = frame->request.scene.shadow.compositor;
+  compositor = CompositorFor(compositor, device().software);
   frame->stop = std::move(stop);
   if (absl::Status status = Record(*frame); !status.ok()) {
     // What it left behind is no other frame's.

@@ -22,7 +22,7 @@ std::vector<uint32_t> CutByCount(size_t count, size_t slices) {
 // Each particle weighs its optical depth times its cross-section, and lies at the middle of its
 // weight; slices divide the total weight evenly.
 std::vector<uint32_t> CutByOpticalDepth(const ParticleView& particles,
-                                        const std::vector<uint32_t>& order, size_t slices) {
+                                        std::span<const uint32_t> order, size_t slices) {
   std::vector<double> weights(order.size());
   for (size_t k = 0; k < order.size(); ++k) {
     const double radius = particles.radius(order[k]);
@@ -61,6 +61,14 @@ std::vector<shader::OrderedParticle> PlaceInSlices(const std::vector<uint32_t>& 
 
 }  // namespace
 
+std::vector<uint32_t> CutIntoSlices(const ParticleView& particles, std::span<const uint32_t> order,
+                                    int slices, SliceSpacing spacing) {
+  const size_t count = std::clamp<size_t>(order.size(), 1, static_cast<size_t>(slices));
+  return spacing == SliceSpacing::kEqualCount || count == order.size()
+             ? CutByCount(order.size(), count)
+             : CutByOpticalDepth(particles, order, count);
+}
+
 ParticleOrder OrderParticles(const ParticleView& particles, const Traversal& traversal,
                              const glm::dvec3& eye) {
   const size_t count = particles.size();
@@ -80,11 +88,8 @@ ParticleOrder OrderParticles(const ParticleView& particles, const Traversal& tra
   const std::vector<uint32_t> sorted = SortedOrder(keys);
 
   ParticleOrder order;
-  const size_t slices = std::clamp<size_t>(count, 1, static_cast<size_t>(traversal.slices));
-  // As many slices as particles are one particle each, whatever their weights.
-  order.slice_begin = traversal.spacing == SliceSpacing::kEqualCount || slices == count
-                          ? CutByCount(count, slices)
-                          : CutByOpticalDepth(particles, sorted, slices);
+  order.slice_begin = CutIntoSlices(particles, sorted, traversal.slices, traversal.spacing);
+  const size_t slices = order.slice_begin.size() - 1;
   order.particles = PlaceInSlices(sorted, order.slice_begin);
   if (traversal.axis) {
     order.slice_position.resize(slices);

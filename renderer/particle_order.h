@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include <glm/vec3.hpp>
@@ -27,5 +28,11 @@ struct ParticleOrder {
 // where there are no fewer slices than particles.
 ParticleOrder OrderParticles(const ParticleView& particles, const Traversal& traversal,
                              const glm::dvec3& eye);
+
+// Slice s of particles in this order is places [begin[s], begin[s + 1]), in at most as many slices
+// as there are particles, at least one: the same number of particles each, or the same share of the
+// sum of optical depth times squared radius. As many slices as particles are one particle each.
+std::vector<uint32_t> CutIntoSlices(const ParticleView& particles, std::span<const uint32_t> order,
+                                    int slices, SliceSpacing spacing);
 
 }  // namespace halflight

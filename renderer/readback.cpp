@@ -62,10 +62,10 @@ GLenum FormatOf(const Image& image) {
   }
 }
 
-void GetPixels(const gl::Texture& texture, const PixelRect& from, GLenum format, size_t bytes,
-               void* to) {
+void GetPixels(const gl::Texture& texture, const PixelRect& from, int layer, GLenum format,
+               size_t bytes, void* to) {
   glPixelStorei(GL_PACK_ALIGNMENT, 1);
-  glGetTextureSubImage(texture.name(), 0, from.x, from.y, 0, from.width, from.height, 1, format,
+  glGetTextureSubImage(texture.name(), 0, from.x, from.y, layer, from.width, from.height, 1, format,
                        GL_FLOAT, static_cast<GLsizei>(bytes), to);
 }
 
@@ -92,22 +92,24 @@ void Readback::BeginStage(StageClock& clock) const {
   }
 }
 
-void Readback::Copy(const gl::Texture& texture, const ImagePlace& to) {
-  Copy(texture, {0, 0, texture.width(), texture.height()}, to);
+void Readback::Copy(const gl::Texture& texture, const ImagePlace& to, int layer) {
+  Copy(texture, {0, 0, texture.width(), texture.height()}, to, layer);
 }
 
-void Readback::Copy(const gl::Texture& texture, const PixelRect& from, const ImagePlace& to) {
+void Readback::Copy(const gl::Texture& texture, const PixelRect& from, const ImagePlace& to,
+                    int layer) {
   const glm::ivec2 size(from.width, from.height);
   const size_t bytes = ValueCount(to.image, size) * sizeof(float);
   const GLenum format = FormatOf(to.image);
   const Staged staged = Stage(bytes);
   if (staged.pixels == nullptr) {
-    PlaceNow(size, to, [&](float* pixels) { GetPixels(texture, from, format, bytes, pixels); });
+    PlaceNow(size, to,
+             [&](float* pixels) { GetPixels(texture, from, layer, format, bytes, pixels); });
     return;
   }
   glBindBuffer(GL_PIXEL_PACK_BUFFER, staged.buffer);
   // NOLINTNEXTLINE(performance-no-int-to-ptr): what GL takes for the offset into the buffer
-  GetPixels(texture, from, format, bytes, reinterpret_cast<void*>(staged.offset));
+  GetPixels(texture, from, layer, format, bytes, reinterpret_cast<void*>(staged.offset));
   glBindBuffer(GL_PIXEL_PACK_BUFFER, 0);
   pending_.push_back({staged.pixels, size, to});
 }

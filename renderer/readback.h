@@ -44,8 +44,9 @@ class Readback {
   void BeginStage(StageClock& clock) const;
 
   // All of a texture, or a part of it, in the channels of the image: four, R G B, or R.
-  void Copy(const gl::Texture& texture, const ImagePlace& to);
-  void Copy(const gl::Texture& texture, const PixelRect& from, const ImagePlace& to);
+  // Of an array texture, of one layer.
+  void Copy(const gl::Texture& texture, const ImagePlace& to, int layer = 0);
+  void Copy(const gl::Texture& texture, const PixelRect& from, const ImagePlace& to, int layer = 0);
   // All pixels of an image of one layer from the floats of a buffer.
   void Copy(const gl::Buffer& buffer, Image& to);
 

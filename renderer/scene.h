@@ -90,6 +90,8 @@ enum class Profile : uint8_t { kSoft, kBall };
 struct PhysicalScattering {
   float mean_cosine = 0.0F;  // [0, 1)
   float albedo = 1.0F;       // share of the light met that is scattered, not absorbed: [0, 1]
+
+  bool operator==(const PhysicalScattering&) const = default;
 };
 
 struct Material {
@@ -112,9 +114,17 @@ struct Material {
 enum class ShadowTechniqueKind : uint8_t {
   kHalfAngle,
   kReference,   // the image model itself, on the CPU
-  kLightSweep,  // exact order along each light, fitted over footprints, on the CPU
+  kLightSweep,  // exact order along each light, fitted over footprints
+  // Uniform depth bins along each light, interpolated, fitted over footprints, on the CPU.
+  kParticleShadowMap,
 };
 enum class SliceSpacing : uint8_t { kEqualCount, kEqualOpticalDepth };
+// What half-angle slicing composites and deposits by.
+enum class SliceCompositor : uint8_t {
+  kAuto,    // what is faster on the device: see CompositorFor
+  kRaster,  // one quad a particle through the blend units, slice after slice
+  kTiles,   // tiles of the image and of the light buffer in compute
+};
 enum class BlurMode : uint8_t { kDistance, kTexelsPerSlice };
 
 struct ShadowSettings {
@@ -122,11 +132,15 @@ struct ShadowSettings {
   int slices = 128;
   bool interpolate = true;
   SliceSpacing spacing = SliceSpacing::kEqualCount;
-  int light_buffer_size = 512;  // texels along each side
+  // Texels along each side of every light buffer; 0: as many as the frame needs, see
+  // light_buffer_size.h, and at most max_light_buffer_size.
+  int light_buffer_size = 0;
+  int max_light_buffer_size = 4096;
   BlurMode blur_mode = BlurMode::kDistance;
   float blur_texels = 0.0F;  // with kTexelsPerSlice
-  // With kLightSweep: of the polynomial in which a particle keeps the light over its footprint, at
-  // most kMaxFitDegree.
+  SliceCompositor compositor = SliceCompositor::kAuto;
+  // With kLightSweep and kParticleShadowMap: of the polynomial in which a particle keeps the light
+  // over its footprint, at most kMaxFitDegree.
   int fit_degree = 4;
 
   bool operator==(const ShadowSettings&) const = default;

@@ -6,6 +6,7 @@
 #include "renderer/projection.h"
 #include "renderer/techniques/half_angle.h"
 #include "renderer/techniques/light_sweep.h"
+#include "renderer/techniques/particle_shadow_map.h"
 #include "renderer/techniques/reference.h"
 
 namespace halflight {
@@ -13,10 +14,13 @@ namespace halflight {
 const ShadowTechnique& TechniqueFor(ShadowTechniqueKind kind) {
   static const HalfAngle half_angle;
   static const LightSweep light_sweep;
+  static const ParticleShadowMap particle_shadow_map;
   static const Reference reference;
   switch (kind) {
     case ShadowTechniqueKind::kLightSweep:
       return light_sweep;
+    case ShadowTechniqueKind::kParticleShadowMap:
+      return particle_shadow_map;
     case ShadowTechniqueKind::kReference:
       return reference;
     case ShadowTechniqueKind::kHalfAngle:
@@ -30,6 +34,11 @@ ShadowTechniqueKind DefaultTechnique(const FrameRequest& request, bool software_
   return software_renderer && TechniqueFor(sweep).Check(request).ok()
              ? sweep
              : ShadowTechniqueKind::kHalfAngle;
+}
+
+SliceCompositor CompositorFor(SliceCompositor asked, bool software_renderer) {
+  if (asked != SliceCompositor::kAuto) return asked;
+  return software_renderer ? SliceCompositor::kRaster : SliceCompositor::kTiles;
 }
 
 LightReport ReportOf(const Projection& light) {

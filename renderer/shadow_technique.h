@@ -71,6 +71,10 @@ const ShadowTechnique& TechniqueFor(ShadowTechniqueKind kind);
 // `request.scene.shadow.technique` does not matter.
 ShadowTechniqueKind DefaultTechnique(const FrameRequest& request, bool software_renderer);
 
+// What half-angle slicing composites by where a request asks for `asked`: kAuto becomes one of the
+// others, tiles on GPUs, which are short of blend units.
+SliceCompositor CompositorFor(SliceCompositor asked, bool software_renderer);
+
 // What a tool needs to place the buffer of a light that casts shadows.
 LightReport ReportOf(const Projection& light);
 

@@ -99,12 +99,6 @@ void SortByDigit(size_t count, const Digit& digit, const Read& read, const Write
 
 }  // namespace
 
-uint32_t OrderedKey(float value) {
-  const auto bits = std::bit_cast<uint32_t>(value == 0.0F ? 0.0F : value);
-  const bool negative = (bits >> 31U) != 0;
-  return negative ? ~bits : bits | 0x80000000U;
-}
-
 std::vector<uint32_t> SortedOrder(std::span<const uint32_t> keys) {
   const size_t count = keys.size();
   std::vector<uint32_t> order(count);

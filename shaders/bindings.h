@@ -37,6 +37,7 @@ HALFLIGHT_CONSTANT(kPlaceRunBinding, 9);
 HALFLIGHT_CONSTANT(kInverseGramBinding, 10);
 HALFLIGHT_CONSTANT(kShadeBinding, 11);
 HALFLIGHT_CONSTANT(kTileCompositeBinding, 12);
+HALFLIGHT_CONSTANT(kSliceWalkBinding, 13);
 
 // Storage buffers.
 HALFLIGHT_CONSTANT(kOrderBinding, 0);          // OrderedParticle[]
@@ -95,14 +96,24 @@ HALFLIGHT_CONSTANT(kTileHeadsBinding, 0);    // vec4[], as shade_sprites.comp wr
 HALFLIGHT_CONSTANT(kTileLightsBinding, 1);   // float[], as shade_light.comp writes them
 HALFLIGHT_CONSTANT(kTileBeginBinding, 2);    // uint[tiles + 1]
 HALFLIGHT_CONSTANT(kTileEntriesBinding, 3);  // uint[]: places
+// Those of slices in tiles, beside the particles' colours, emissions, order and splats.
+HALFLIGHT_CONSTANT(kSliceTileBeginBinding, 1);    // uint[tiles + 1]
+HALFLIGHT_CONSTANT(kSliceTileEntriesBinding, 2);  // uint[]: places
+HALFLIGHT_CONSTANT(kSliceBeginsBinding, 3);       // uint[slices + 1]: places
+HALFLIGHT_CONSTANT(kSplatRectsBinding, 5);        // uvec2[N]
 
 // Images.
-HALFLIGHT_CONSTANT(kTileTargetBinding, 0);  // premultiplied
+HALFLIGHT_CONSTANT(kTileTargetBinding, 0);           // premultiplied
+HALFLIGHT_CONSTANT(kDepthTargetBinding, 1);          // depth * alpha, 0, 0, alpha
+HALFLIGHT_CONSTANT(kTransmittanceTargetBinding, 2);  // R G B * alpha, alpha
+HALFLIGHT_CONSTANT(kLightTargetBinding, 0);          // a light buffer
+HALFLIGHT_CONSTANT(kLayersTargetBinding, 1);         // an array of them
 
 // Textures.
 HALFLIGHT_CONSTANT(kLightBeforeBinding, 0);  // light buffer without the current slice
 HALFLIGHT_CONSTANT(kLightAfterBinding, 1);   // light buffer with it
 HALFLIGHT_CONSTANT(kSourceBinding, 0);       // what a full-screen pass reads
+HALFLIGHT_CONSTANT(kLightLayersBinding, 0);  // light buffers that a run of slices sees
 
 // Specialisation constants.
 HALFLIGHT_CONSTANT(kOrthographicConstant, 0);
@@ -133,6 +144,7 @@ HALFLIGHT_CONSTANT(kTileRowsConstant, 31);
 HALFLIGHT_CONSTANT(kTileChunkConstant, 32);
 HALFLIGHT_CONSTANT(kTileLightsConstant, 33);
 HALFLIGHT_CONSTANT(kTileShowsConstant, 34);
+HALFLIGHT_CONSTANT(kBackToFrontConstant, 35);
 
 // Values of kTileShowsConstant: what the tile compositor makes an image of.
 HALFLIGHT_CONSTANT(kShowsColor, 0);
@@ -147,6 +159,7 @@ HALFLIGHT_CONSTANT(kScanPerInvocation, 8);
 HALFLIGHT_CONSTANT(kSortGroupSize, 256);  // and digits a pass
 HALFLIGHT_CONSTANT(kSortRounds, 16);
 HALFLIGHT_CONSTANT(kListGroupSize, 256);
+HALFLIGHT_CONSTANT(kSliceChunk, 64);  // particles of a slice that a tile loads at once
 // Texels in the patches of one run, at most: 64 MiB. Keeps the loops over them below the 65,535
 // iterations after which llvmpipe ends those of an invocation, and sums of 256 below 2^32.
 HALFLIGHT_CONSTANT(kMaxPatchTexels, 0xFFFFFFu);
@@ -261,6 +274,15 @@ struct TileCompositeBlock {
   uvec4 slots;  // x: the first that is shown, y: of each particle
   uvec4 tiles;  // xy: the one that the target begins with; z: across the image
   vec4 colors[kMaxLightsInTiles];  // by slot: rgb; w: least exponent
+};
+
+// What one dispatch walks of the slices, in tiles of the image or of the light buffer. The slices
+// [first, end) of a run have layers of their own: slice s sees layer (s - first) * step, and with
+// itself in it the one after.
+struct SliceWalkBlock {
+  uvec4 slices;  // the image: x: the first, y: the end, z: step; the light: those that begin here
+  uvec4 window;  // the image: entries of each tile's list: x: the first, y: how many; the light:
+                 // places [x, y), z: the run's first slice
 };
 
 // What a list of sprites is seen from, in float64: depths then order particles as they do on the

@@ -156,25 +156,37 @@ void AddMaterialFlags(CLI::App& app, RenderOptions& options) {
 }
 
 void AddShadowFlags(CLI::App& app, RenderOptions& options) {
-  AddChoice<v1::ShadowTechnique>(app, "--technique", options.technique,
-                                 {{"half-angle", v1::SHADOW_TECHNIQUE_HALF_ANGLE},
-                                  {"light-sweep", v1::SHADOW_TECHNIQUE_LIGHT_SWEEP},
-                                  {"reference", v1::SHADOW_TECHNIQUE_REFERENCE}},
-                                 "How shadows are computed: by slices; along each light, on the "
-                                 "CPU; or exactly, in float64 on the CPU. Default: light-sweep on "
-                                 "servers without a GPU, unless something asks for slices "
-                                 "(--slices, --plain, --spacing, --blur, --scattering, layers); "
-                                 "otherwise half-angle");
+  AddChoice<v1::ShadowTechnique>(
+      app, "--technique", options.technique,
+      {{"half-angle", v1::SHADOW_TECHNIQUE_HALF_ANGLE},
+       {"light-sweep", v1::SHADOW_TECHNIQUE_LIGHT_SWEEP},
+       {"particle-shadow-map", v1::SHADOW_TECHNIQUE_PARTICLE_SHADOW_MAP},
+       {"reference", v1::SHADOW_TECHNIQUE_REFERENCE}},
+      "How shadows are computed: by slices; along each light; from "
+      "slices along each light, for comparison; or exactly, in float64 "
+      "on the CPU. Default: light-sweep on servers without a GPU, unless "
+      "something asks for slices (--slices, --plain, --spacing, "
+      "--compositor, --blur, --blur-texels); otherwise half-angle");
   AddCount(app, "--fit-degree", options.fit_degree, 0, 6,
-           "Degree in which light-sweep keeps the light over a particle; default: 4");
-  AddCount(app, "--slices", options.slices, 1, INT32_MAX, "Slices of half-angle; default: 128");
-  app.add_flag("--plain", options.plain, "Do not interpolate the light within a slice");
+           "Degree in which light-sweep and particle-shadow-map keep the light over a particle; "
+           "default: 4");
+  AddCount(
+      app, "--slices", options.slices, 1, INT32_MAX,
+      "Slices of half-angle and particle-shadow-map, and of light-sweep where light scatters or "
+      "layers are shown; default: 128");
+  app.add_flag("--plain", options.plain, "Do not interpolate the light within half-angle's slices");
   AddChoice<v1::SliceSpacing>(app, "--spacing", options.spacing,
                               {{"count", v1::SLICE_SPACING_EQUAL_COUNT},
                                {"optical-depth", v1::SLICE_SPACING_EQUAL_OPTICAL_DEPTH}},
                               "What slices have in equal parts; default: count");
+  AddChoice<v1::SliceCompositor>(
+      app, "--compositor", options.compositor,
+      {{"raster", v1::SLICE_COMPOSITOR_RASTER}, {"tiles", v1::SLICE_COMPOSITOR_TILES}},
+      "What slices are drawn by: the blend units, or tiles in compute shaders; default: tiles on "
+      "GPUs, raster on CPUs");
   AddCount(app, "--light-buffer", options.light_buffer_size, 16, 65536,
-           "Width and height of the light buffer in texels; default: 512");
+           "Width and height of the light buffer in texels; default: half-angle 512, others by "
+           "the particles' radii, 64 to 1024");
   AddChoice<v1::BlurMode>(
       app, "--blur", options.blur_mode,
       {{"distance", v1::BLUR_MODE_DISTANCE}, {"texels", v1::BLUR_MODE_TEXELS_PER_SLICE}},
@@ -207,8 +219,8 @@ void AddErrorFlags(CLI::App& app, RenderOptions& options) {
       AddNumber(app, "--max-time", options.max_time_ms, kPositive,
                 "Choose the settings: the most accurate that render in so many milliseconds")
           ->type_name("MS");
-  for (const char* settings : {"--technique", "--slices", "--plain", "--spacing", "--light-buffer",
-                               "--fit-degree", "--blur", "--blur-texels"}) {
+  for (const char* settings : {"--technique", "--slices", "--plain", "--spacing", "--compositor",
+                               "--light-buffer", "--fit-degree", "--blur", "--blur-texels"}) {
     max_error->excludes(app.get_option(settings));
     max_time->excludes(app.get_option(settings));
   }

@@ -87,6 +87,7 @@ struct RenderOptions {
   std::optional<uint32_t> slices;
   bool plain = false;
   std::optional<v1::SliceSpacing> spacing;
+  std::optional<v1::SliceCompositor> compositor;
   std::optional<uint32_t> light_buffer_size;
   std::optional<uint32_t> fit_degree;
   std::optional<v1::BlurMode> blur_mode;

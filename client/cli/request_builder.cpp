@@ -249,8 +249,8 @@ void ApplyMaterial(const RenderOptions& options, v1::Scene& scene) {
 // Settings and a target take each other's place.
 void ApplyTarget(const RenderOptions& options, v1::RenderFrameRequest& request) {
   const bool has_settings = options.technique || options.slices || options.plain ||
-                            options.spacing || options.light_buffer_size || options.blur_mode ||
-                            options.blur_texels;
+                            options.spacing || options.compositor || options.light_buffer_size ||
+                            options.blur_mode || options.blur_texels;
   if (has_settings) {
     request.clear_target();
   }
@@ -277,6 +277,9 @@ void ApplyShadowAndSampling(const RenderOptions& options, v1::Scene& scene) {
   }
   if (options.spacing) {
     scene.mutable_shadow()->set_spacing(*options.spacing);
+  }
+  if (options.compositor) {
+    scene.mutable_shadow()->set_compositor(*options.compositor);
   }
   if (options.light_buffer_size) {
     scene.mutable_shadow()->set_light_buffer_size(*options.light_buffer_size);

@@ -30,8 +30,12 @@ namespace {
 
 GLuint CreateTexture(const TextureInfo& info) {
   GLuint name = 0;
-  glCreateTextures(GL_TEXTURE_2D, 1, &name);
-  glTextureStorage2D(name, 1, info.format, info.width, info.height);
+  glCreateTextures(info.layers > 0 ? GL_TEXTURE_2D_ARRAY : GL_TEXTURE_2D, 1, &name);
+  if (info.layers > 0) {
+    glTextureStorage3D(name, 1, info.format, info.width, info.height, info.layers);
+  } else {
+    glTextureStorage2D(name, 1, info.format, info.width, info.height);
+  }
   glTextureParameteri(name, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE);
   glTextureParameteri(name, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);
   glTextureParameteri(name, GL_TEXTURE_MIN_FILTER, GL_LINEAR);

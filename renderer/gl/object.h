@@ -85,9 +85,11 @@ struct TextureInfo {
   GLenum format = GL_RGBA32F;  // glTextureStorage2D
   int width = 1;
   int height = 1;
+  int layers = 0;  // of an array texture; 0: of none
 };
 
-// A bilinearly filtered 2D texture without mipmaps, clamped to its edge, which knows its size.
+// A bilinearly filtered 2D texture, or an array of them, without mipmaps, clamped to its edge,
+// which knows its size.
 class Texture : public Object<TextureTraits> {
  public:
   Texture() = default;

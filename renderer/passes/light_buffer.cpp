@@ -2,9 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
-
-#include <glm/common.hpp>
 
 #include "renderer/blur_kernel.h"
 #include "renderer/gl/debug.h"
@@ -60,24 +57,18 @@ absl::Status BlurOnce(Gpu& gpu, const LightBuffer& from, const LightBuffer& to,
   return absl::OkStatus();
 }
 
-// Blurs `buffer` along one axis. Kernels applied in turn add their variances; what earlier ones
-// have smoothed, later ones may take in strides, so that any width needs a handful of passes.
+// Blurs `buffer` along one axis.
 absl::Status BlurAlongAxis(Gpu& gpu, LightBuffer& buffer, LightBuffer& scratch,
                            const glm::uvec2& axis, const glm::dvec3& variance,
                            const glm::vec3& density, const LightChannels& channels) {
-  // Light spread further than the buffer is wide is the same everywhere.
-  glm::dvec3 left = glm::min(variance, glm::dvec3(std::pow(buffer.texture.width(), 2)));
-  for (uint32_t stride = 1; left.r > 0.0 || (channels.colored && (left.g > 0.0 || left.b > 0.0));
-       stride *= 4) {
-    const double squared_stride = stride * stride;
-    const glm::dvec3 now = glm::min(left, glm::dvec3(kMaxBlurVariance * squared_stride));
+  for (const BlurStep& step :
+       BlurSteps(channels.colored ? variance : glm::dvec3(variance.r), buffer.texture.width())) {
     if (absl::Status status =
-            BlurOnce(gpu, buffer, scratch, axis, stride, now / squared_stride, density, channels);
+            BlurOnce(gpu, buffer, scratch, axis, step.stride, step.variance, density, channels);
         !status.ok()) {
       return status;
     }
     std::swap(buffer, scratch);
-    left -= now;
   }
   return absl::OkStatus();
 }

@@ -5,6 +5,7 @@
 
 #include "absl/status/status.h"
 #include "renderer/gpu.h"
+#include "renderer/light_spread.h"
 #include "renderer/passes/project.h"
 #include "renderer/scene.h"
 
@@ -31,12 +32,6 @@ absl::Status DepositSlice(Gpu& gpu, const gl::Buffer& light_splats, const Target
                           uint32_t end, const LightBuffer& target);
 
 void CopyLightBuffer(const LightBuffer& from, const LightBuffer& to);
-
-// How far light spreads sideways: variances along x and y of each colour, in squared texels.
-struct BlurVariance {
-  glm::dvec3 x;
-  glm::dvec3 y;
-};
 
 // Spreads the light in `buffer`, or where it holds the unscattered light, what is scattered.
 // `density` is the light's shadow density; red serves for a buffer that is not colored. `scratch`

@@ -1,5 +1,5 @@
-// The two inner loops of the light sweep, each over one tile, for the best instruction set of the
-// machine. Plain arrays in and out; no allocation, no threads.
+// The inner loops of the light sweep, over one tile or one line of the light buffer, for the best
+// instruction set of the machine. Plain arrays in and out; no allocation, no threads.
 #pragma once
 
 #include <cstdint>
@@ -49,6 +49,8 @@ struct LightEntry {
   uint8_t y_end = 0;
 };
 
+constexpr int kLightTileTexels = kLightTile * kLightTile;
+
 struct LightTileJob {
   TargetShape shape;
   PixelGrid grid;  // of the tile
@@ -56,12 +58,42 @@ struct LightTileJob {
   const LightEntry* entries = nullptr;  // nearest the light first
   uint32_t entry_count = 0;
   int degree = 0;
+  int channels = 1;        // optical depths of the light: one, or three for coloured light
+  float met = 1.0F;        // share of the particles' optical depth that the light meets
+  float* depth = nullptr;  // by channel kLightTileTexels
   // A moments index: sums over the texels that the particle covers, weighted by its optical depth
-  // relative to its centre's: of the monomials (Terms(degree)), and of the optical depth that the
-  // light met before the particle times the monomials (as many).
+  // relative to its centre's: of the monomials (Terms(degree)), and by channel of the optical depth
+  // that the light met before the particle times the monomials (as many).
   float* moments = nullptr;
-  float* depth = nullptr;  // kLightTile * kLightTile: in 0, out the tile's optical depth
+  // Of layers, kLightTileTexels: the optical depth of all particles of a slab, and by sprite where
+  // within the slab it lies, 0 to 1. The depth is then what lies before the slab, and stays.
+  const float* slab = nullptr;
+  const float* places = nullptr;
 };
+
+// Lines of texels side by side: texel after texel of one line, in which case a vector is so many of
+// its texels, or kLineLanes lines at once, a vector for each step along them.
+inline constexpr int kLineLanes = 8;
+struct BlurLineJob {
+  float* depth = nullptr;              // optical depth: `vectors` vectors, `pitch` floats apart
+  const float* unscattered = nullptr;  // that of the light which stays where it is, or null
+  int64_t pitch = 0;
+  int vectors = 0;
+  int tap = 0;                     // floats between texels of the kernel, were pitch kLineLanes
+  const float* weights = nullptr;  // of texels 0 to radius away, none of them a line's length away
+  int radius = 0;
+  float outside = 0.0F;      // what the kernel weighs beyond these, on both sides together
+  float density = 0.0F;      // not 0
+  float* scratch = nullptr;  // BlurScratchFloats()
+};
+
+// Vectors of a line that are looked at together for whether there is anything to do.
+inline constexpr int kBlurChunk = 8;
+constexpr int64_t BlurScratchFloats(int vectors, int radius, int tap) {
+  const int64_t chunks = (vectors + kBlurChunk - 1) / kBlurChunk;
+  const int64_t line = chunks * (kBlurChunk * kLineLanes);
+  return 3 * (line + 2 * int64_t{radius} * tap) + chunks;
+}
 
 struct Rgb {
   float red = 0.0F;
@@ -118,12 +150,16 @@ struct ImageTileJob {
 };
 
 struct Kernels {
+  // With a slab: moments alone, from between the layers before and behind it. Else deposits.
   void (*sweep_light_tile)(const LightTileJob& job);
+  // Adds the particles' optical depth to kLightTileTexels texels, and nothing else.
+  void (*deposit_light_tile)(const LightTileJob& job, float* depth);
+  // Blurs in place, as shaders/blur.frag does.
+  void (*blur_line)(const BlurLineJob& job);
   void (*composite_image_tile)(const ImageTileJob& job);
 };
 
-// For the CPU this runs on, and for any.
+// For the CPU this runs on; see ListKernels in kernel_sets.h.
 const Kernels& BestKernels();
-const Kernels& BaselineKernels();
 
 }  // namespace halflight::sweep

@@ -7,4 +7,5 @@
 #include "renderer/sweep/simd.h"
 
 #define HALFLIGHT_KERNEL_SET avx2
+#include "renderer/sweep/blur_kernel.inc"
 #include "renderer/sweep/kernels.inc"

@@ -56,6 +56,18 @@ std::vector<double> Inverse(std::vector<double> m, int n) {
 template <int kDegree>
 void SubstituteAt(const float* p, const glm::dvec2& of_x, const glm::dvec2& of_y, double factor,
                   float* q) {
+  if (kDegree == 0) {
+    q[0] = static_cast<float>(factor * p[0]);
+    return;
+  }
+  if (kDegree == 1) {
+    const double v = factor * p[1];
+    const double u = factor * p[2];
+    q[0] = static_cast<float>(factor * p[0]);
+    q[1] = static_cast<float>(u * of_y.x + v * of_y.y);
+    q[2] = static_cast<float>(u * of_x.x + v * of_x.y);
+    return;
+  }
   const auto times = [](auto& r, int degree, double x, double y) {
     r[degree + 1] = r[degree] * x;
     for (int i = degree; i > 0; --i) r[i] = r[i] * y + r[i - 1] * x;
@@ -89,7 +101,7 @@ void Substitute(int degree, std::span<const float> p, const glm::dvec2& of_x,
   kByDegree[degree](p.data(), of_x, of_y, factor, q.data());
 }
 
-DiscFit::DiscFit(Profile profile, int degree) : terms_(Terms(degree)) {
+DiscFit::DiscFit(Profile profile, int degree) : degree_(degree) {
   std::vector<std::pair<int, int>> powers;
   for (int a = 0; a <= degree; ++a) {
     for (int b = 0; a + b <= degree; ++b) powers.emplace_back(a, b);
@@ -101,44 +113,38 @@ DiscFit::DiscFit(Profile profile, int degree) : terms_(Terms(degree)) {
                                                  powers[i].second + powers[j].second);
     }
   }
-  // Monomials of unlike parity have no product, and none in the inverse.
-  const std::vector<double> inverse = Inverse(std::move(gram), terms_);
-  for (size_t i = 0; i < powers.size(); ++i) {
-    for (size_t j = 0; j < powers.size(); ++j) {
-      if ((powers[i].first - powers[j].first) % 2 != 0) continue;
-      if ((powers[i].second - powers[j].second) % 2 != 0) continue;
-      inverse_gram_.push_back({static_cast<uint8_t>(j), inverse[i * powers.size() + j]});
-    }
-    row_end_[i] = inverse_gram_.size();
-  }
+  inverse_gram_ = Inverse(std::move(gram), Terms(degree));
 }
 
-std::vector<double> DiscFit::inverse_gram() const {
-  std::vector<double> dense(static_cast<size_t>(terms_) * static_cast<size_t>(terms_), 0.0);
-  size_t entry = 0;
-  for (size_t i = 0; i < static_cast<size_t>(terms_); ++i) {
-    for (; entry < row_end_[i]; ++entry) {
-      dense[i * static_cast<size_t>(terms_) + inverse_gram_[entry].column] =
-          inverse_gram_[entry].value;
+template <int kDegree>
+void DiscFit::FitAt(const double* inverse_gram, const float* weights, const float* values,
+                    float* polynomial) {
+  constexpr int kTerms = Terms(kDegree);
+  double centered[kTerms];
+  const double inverse = weights[0] > 0.0F ? 1.0 / weights[0] : 0.0;
+  const double mean = values[0] * inverse;
+  for (int i = 0; i < kTerms; ++i) centered[i] = (values[i] - mean * weights[i]) * inverse;
+  for (int a = 0, i = 0; a <= kDegree; ++a) {
+    for (int b = 0; a + b <= kDegree; ++b, ++i) {
+      double coefficient = i == 0 ? mean : 0.0;
+      // Monomials of unlike parity have no product, and none in the inverse.
+      for (int c = a % 2; c <= kDegree; c += 2) {
+        for (int d = b % 2; c + d <= kDegree; d += 2) {
+          const int j = TermIndex(kDegree, c, d);
+          coefficient += inverse_gram[i * kTerms + j] * centered[j];
+        }
+      }
+      polynomial[i] = static_cast<float>(coefficient);
     }
   }
-  return dense;
 }
 
 void DiscFit::Fit(std::span<const float> weights, std::span<const float> values,
                   std::span<float> polynomial) const {
-  std::array<double, Terms(kMaxDegree)> centered = {};
-  const double inverse = weights[0] > 0.0F ? 1.0 / weights[0] : 0.0;
-  const double mean = values[0] * inverse;
-  for (int i = 0; i < terms_; ++i) centered[i] = (values[i] - mean * weights[i]) * inverse;
-  size_t entry = 0;
-  for (int i = 0; i < terms_; ++i) {
-    double coefficient = i == 0 ? mean : 0.0;
-    for (; entry < row_end_[i]; ++entry) {
-      coefficient += inverse_gram_[entry].value * centered[inverse_gram_[entry].column];
-    }
-    polynomial[i] = static_cast<float>(coefficient);
-  }
+  constexpr void (*kByDegree[])(const double*, const float*, const float*, float*) = {
+      FitAt<0>, FitAt<1>, FitAt<2>, FitAt<3>, FitAt<4>, FitAt<5>, FitAt<6>};
+  static_assert(std::size(kByDegree) == kMaxDegree + 1);
+  kByDegree[degree_](inverse_gram_.data(), weights.data(), values.data(), polynomial.data());
 }
 
 }  // namespace halflight::sweep

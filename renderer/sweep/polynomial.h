@@ -1,8 +1,6 @@
 // Polynomials of two variables as the kernels keep them, and least squares on the unit disc.
 #pragma once
 
-#include <array>
-#include <cstdint>
 #include <span>
 #include <vector>
 
@@ -33,17 +31,15 @@ class DiscFit {
 
   // Inverse of the products of the monomials, scaled so that that of 1 and 1 is 1; Terms(degree)
   // squared.
-  [[nodiscard]] std::vector<double> inverse_gram() const;
+  [[nodiscard]] const std::vector<double>& inverse_gram() const { return inverse_gram_; }
 
  private:
-  struct Entry {
-    uint8_t column;
-    double value;
-  };
+  template <int kDegree>
+  static void FitAt(const double* inverse_gram, const float* weights, const float* values,
+                    float* polynomial);
 
-  int terms_;
-  std::vector<Entry> inverse_gram_;  // what is not 0, row by row
-  std::array<size_t, Terms(kMaxDegree)> row_end_ = {};
+  int degree_;
+  std::vector<double> inverse_gram_;
 };
 
 }  // namespace halflight::sweep

@@ -298,7 +298,7 @@ Shading ShadeSprites(const Scene& scene, const ParticleView& particles, const Pr
         for (size_t e = 0; e < exponents; ++e) {
           const std::span<float> out(own + e * terms, terms);
           if (fit_of[l] != nullptr) {
-            const std::span<const float> depth(&fit_of[l]->depth[i * terms], terms);
+            const std::span<const float> depth(fit_of[l]->DepthOf(i, e), terms);
             const double density = source.shadow_density[static_cast<glm::length_t>(e)];
             if (near) {
               for (size_t t = 0; t < terms; ++t) out[t] = static_cast<float>(density * depth[t]);

@@ -52,7 +52,8 @@ struct TechniqueModel {
   size_t error_parts;
 };
 
-// All techniques, in the order of ShadowTechniqueKind.
+// The techniques that may be the best choice, in the order of ShadowTechniqueKind, which has those
+// first.
 std::span<const TechniqueModel> TechniqueModels();
 const TechniqueModel& ModelOf(ShadowTechniqueKind kind);
 

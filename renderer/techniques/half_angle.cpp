@@ -14,6 +14,7 @@
 #include "renderer/passes/resolve.h"
 #include "renderer/readback.h"
 #include "renderer/techniques/half_angle_light.h"
+#include "renderer/techniques/half_angle_tiles.h"
 #include "renderer/techniques/traversal_context.h"
 
 namespace halflight {
@@ -39,7 +40,8 @@ void DescribePasses(FramePlan& plan) {
     } else {
       plan.passes.push_back(DescribeSort(traversal));
       plan.passes.push_back({"project particles for the eye", "every traversal", 1});
-      plan.passes.push_back({"composite", "the image", 1});
+      plan.passes.push_back(traversal.in_tiles ? DescribeCompositeInTiles()
+                                               : PlannedPass{"composite", "the image", 1});
     }
   }
 }
@@ -63,10 +65,11 @@ absl::Status DrawUnshadowed(const TraversalContext& context) {
   absl::StatusOr<gl::Buffer> splats = ProjectParticles(
       context.gpu, context.buffers, **order, context.eye, "project particles for the eye");
   if (!splats.ok()) return splats.status();
-  context.clock.BeginGpu("light and composite");
   const CompositePass composite =
       PrepareComposite(context.scene, context.traversal, **order, context.buffers,
                        context.eye.projection, *splats, nullptr, nullptr, context.targets.front());
+  if (context.traversal.in_tiles) return DrawUnshadowedInTiles(context, composite);
+  context.clock.BeginGpu("light and composite");
   return CompositeSlice(context.gpu, composite, 0, (*order)->count(), nullptr, context.targets);
 }
 
@@ -142,7 +145,6 @@ absl::Status HalfAngle::Plan(const FrameRequest& request, const ParticleView& pa
       continue;
     }
     Traversal traversal = PlanHalfAngleLight(scene, particles, light);
-    traversal.shadow_light = light;
     KeepWhatOutputsShow(request.images, traversal);
     plan.traversals.push_back(std::move(traversal));
   }
@@ -150,6 +152,7 @@ absl::Status HalfAngle::Plan(const FrameRequest& request, const ParticleView& pa
   // parallel rays, each from an eye of its own, that is the depth along them.
   if (plan.traversals.empty()) {
     plan.traversals.emplace_back();
+    plan.traversals.front().in_tiles = scene.shadow.compositor == SliceCompositor::kTiles;
     if (std::holds_alternative<Orthographic>(scene.camera.projection)) {
       plan.traversals.front().axis = ViewDirection(scene.camera);
     }
@@ -194,6 +197,7 @@ absl::StatusOr<DrawnFrame> HalfAngle::Draw(const DrawContext& context) const {
                                             traversal.keep_transmittance));
     }
     const TraversalContext walk{.gpu = context.gpu,
+                                .device = context.device,
                                 .cache = context.cache,
                                 .scene = scene,
                                 .traversal = traversal,

@@ -1,79 +1,16 @@
 #include "renderer/techniques/half_angle_light.h"
 
-#include <algorithm>
-#include <cmath>
-#include <limits>
-
 #include <glm/geometric.hpp>
 
 #include "absl/strings/str_cat.h"
 #include "renderer/frame.h"
-#include "renderer/scattering.h"
+#include "renderer/light_spread.h"
 #include "renderer/shadow_technique.h"
+#include "renderer/techniques/half_angle_tiles.h"
 
 namespace halflight {
 
 namespace {
-
-// How light spreads along one light's traversal.
-class Spread {
- public:
-  // Of a scene that scatters. `light_along_axis`: distance along the axis for one along the light.
-  Spread(const TraversalContext& context, const Light& light, double light_along_axis)
-      : shadow_(context.scene.shadow),
-        spread_(context.scene.material.scattering_spread),
-        light_along_axis_(light_along_axis) {
-    if (context.scene.material.physical_scattering) {
-      physical_.emplace(context.particles, light, *context.traversal.axis,
-                        *context.scene.material.physical_scattering,
-                        context.scene.material.profile);
-    }
-  }
-
-  // Squared world units by which light spreads between two positions along the axis.
-  [[nodiscard]] glm::dvec3 Variance(double from, double to) const {
-    if (physical_) return physical_->VarianceAt(to) - physical_->VarianceAt(from);
-    return glm::dvec3(spread_ * spread_ * (to - from) / light_along_axis_);
-  }
-
-  // The same in texels of the light buffer, between two slices that lie there.
-  [[nodiscard]] BlurVariance InTexels(double from, double to,
-                                      const glm::dvec2& texels_per_unit) const {
-    if (shadow_.blur_mode == BlurMode::kTexelsPerSlice) {
-      const double texels = shadow_.blur_texels;
-      return {glm::dvec3(texels * texels), glm::dvec3(texels * texels)};
-    }
-    const glm::dvec3 variance = Variance(from, to);
-    return {variance * texels_per_unit.x * texels_per_unit.x,
-            variance * texels_per_unit.y * texels_per_unit.y};
-  }
-
-  // World units by which light that crosses the whole cloud has spread sideways, thrice the
-  // standard deviation; never so much that the cloud itself shrinks to nothing in the light buffer.
-  [[nodiscard]] double Border(const OffsetBounds& bounds) const {
-    if (shadow_.blur_mode == BlurMode::kTexelsPerSlice) return 0.0;
-    const double diameter = glm::distance(bounds.low, bounds.high);
-    const glm::dvec3 variance = physical_
-                                    ? physical_->VarianceAt(std::numeric_limits<double>::infinity())
-                                    : glm::dvec3(spread_ * spread_ * diameter);
-    return std::min(3.0 * std::sqrt(std::max({variance.r, variance.g, variance.b})),
-                    0.25 * diameter);
-  }
-
- private:
-  const ShadowSettings& shadow_;
-  double spread_;
-  double light_along_axis_;
-  std::optional<PhysicalSpread> physical_;
-};
-
-// Texels of the light buffer for one world unit at the middle of the particles.
-glm::dvec2 TexelsPerUnit(const Projection& light, const ParticleView& particles) {
-  const glm::dvec2 texels_per_unit = glm::abs(light.pixel_from_plane);
-  if (light.orthographic) return texels_per_unit;
-  return texels_per_unit /
-         glm::distance(particles.set().origin + particles.bounds().center(), light.eye());
-}
 
 LightChannels ChannelsOf(const Traversal& traversal) {
   return {.colored = traversal.colored_light_buffer, .unscattered = traversal.keep_unscattered};
@@ -95,11 +32,67 @@ struct LightBuffers {
   }
 };
 
-// Of the traversal's light buffer as it stands at times, without pixels.
-Image DescribeLightImage(const Traversal& traversal, int layers) {
-  Image image{traversal.light_buffer_size, traversal.light_buffer_size, layers, {"Y"}, {}};
-  if (traversal.colored_light_buffer) image.channels = {"R", "G", "B"};
-  return image;
+// Slice by slice, through the blend units: deposits it, draws it, blurs.
+absl::Status DrawSlicesByBlending(const TraversalContext& context, const SlicedLight& sliced,
+                                  ShadowResult& shadow) {
+  const Traversal& traversal = context.traversal;
+  const DeviceOrder& order = sliced.order;
+  Gpu& gpu = context.gpu;
+  context.clock.BeginGpu("light and composite");
+  LightBuffers buffers(traversal);
+  const auto blur = [&](double from, double to) {
+    return sliced.blur(from, to, buffers.before, buffers.scratch);
+  };
+  const size_t slices = order.slice_begin.size() - 1;
+  shadow.light_layers = DescribeLightImage(traversal, static_cast<int>(slices));
+  for (size_t s = 0; s < slices; ++s) {
+    if (context.stop.stop_requested()) return absl::CancelledError("frame cancelled");
+    const uint32_t begin = order.slice_begin[s];
+    const uint32_t end = order.slice_begin[s + 1];
+    if (traversal.blur && s > 0) {
+      if (absl::Status status = blur(order.slice_position[s - 1], order.slice_position[s]);
+          !status.ok()) {
+        return status;
+      }
+    }
+    LightBuffer& deposit_into = traversal.interpolate ? buffers.after : buffers.before;
+    const auto deposit = [&] {
+      return DepositSlice(gpu, sliced.splats, sliced.light, context.scene.material.profile,
+                          sliced.channels, begin, end, deposit_into);
+    };
+    const auto draw = [&] {
+      const SliceLight slice_light{buffers.before, deposit_into};
+      return CompositeSlice(gpu, sliced.composite, begin, end, &slice_light, context.targets);
+    };
+    // Plain slicing sees the light without its own slice, interpolation the light on both sides.
+    absl::Status status;
+    if (traversal.interpolate) {
+      CopyLightBuffer(buffers.before, buffers.after);
+      status = deposit();
+      status.Update(draw());
+      std::swap(buffers.before, buffers.after);
+    } else {
+      status = draw();
+      status.Update(deposit());
+    }
+    if (!status.ok()) return status;
+    if (traversal.keep_layers) {
+      context.readback.Copy(buffers.before.texture,
+                            {.image = shadow.light_layers, .layer = static_cast<int>(s)});
+    }
+  }
+  if (traversal.keep_light_buffer) {
+    // The buffer stands at the middle of the last slice; shown is the light behind all particles.
+    if (traversal.blur) {
+      if (absl::Status status = blur(order.slice_position.back(), order.end_position);
+          !status.ok()) {
+        return status;
+      }
+    }
+    shadow.light_buffer = DescribeLightImage(traversal, 1);
+    context.readback.Copy(buffers.before.texture, {shadow.light_buffer});
+  }
+  return absl::OkStatus();
 }
 
 }  // namespace
@@ -113,17 +106,11 @@ Traversal PlanHalfAngleLight(const Scene& scene, const ParticleView& particles, 
   const Light& source = scene.lights[static_cast<size_t>(light)];
   const HalfAngleAxis half_angle =
       ComputeHalfAngleAxis(ViewDirection(scene.camera), TravelDirection(source, particles));
-  Traversal traversal;
+  Traversal traversal = PlanLightBuffer(scene, particles, light);
   traversal.axis = half_angle.axis;
   traversal.back_to_front = half_angle.back_to_front;
-  traversal.slices = static_cast<int>(
-      std::clamp<size_t>(particles.size(), 1, static_cast<size_t>(scene.shadow.slices)));
+  traversal.in_tiles = scene.shadow.compositor == SliceCompositor::kTiles;
   traversal.interpolate = scene.shadow.interpolate;
-  traversal.spacing = scene.shadow.spacing;
-  traversal.light_buffer_size = scene.shadow.light_buffer_size;
-  traversal.blur = scene.scatters();
-  traversal.keep_unscattered = traversal.blur && scene.material.physical_scattering;
-  traversal.colored_light_buffer = traversal.blur && source.colored_density();
   return traversal;
 }
 
@@ -156,11 +143,12 @@ std::vector<PlannedPass> DescribeHalfAnglePasses(const Traversal& traversal) {
       {"project particles for the light", light, 1},
   };
   if (traversal.blur) passes.push_back({"blur light buffer", "the light scatters", slices - 1});
-  if (traversal.interpolate) {
+  if (traversal.interpolate && !traversal.in_tiles) {
     passes.push_back({"copy light buffer", "interpolation within slices", slices});
   }
   passes.push_back({"deposit slice into light buffer", light, slices});
-  passes.push_back({"composite slice", "the image", slices});
+  passes.push_back(traversal.in_tiles ? DescribeCompositeInTiles()
+                                      : PlannedPass{"composite slice", "the image", slices});
   if (traversal.keep_layers) passes.push_back({"read back layer", "light layers wanted", slices});
   return passes;
 }
@@ -177,17 +165,11 @@ absl::Status DrawHalfAngleLight(const TraversalContext& context, LightReport& re
   if (!sorted.ok()) return sorted.status();
   const DeviceOrder& order = **sorted;
   context.clock.BeginCpu("light camera");
-  std::optional<Spread> spread;
-  if (traversal.blur) {
-    spread.emplace(context, source,
-                   glm::dot(TravelDirection(source, context.particles), *traversal.axis));
-  }
-  Projection light_projection =
-      LightProjection(source, context.particles, traversal.light_buffer_size,
-                      spread ? spread->Border(context.particles.bounds()) : 0.0);
-  if (const auto& physical = context.scene.material.physical_scattering) {
-    light_projection.optical_depth_scale = ForwardExtinction(*physical);
-  }
+  std::optional<LightSpread> spread;
+  if (traversal.blur) spread.emplace(context.scene, source, context.particles, *traversal.axis);
+  Projection light_projection = LightProjection(
+      source, context.particles, traversal.light_buffer_size, spread ? spread->Border() : 0.0);
+  light_projection.optical_depth_scale = ForwardExtinction(context.scene.material);
   report = ReportOf(light_projection);
   report.slice_axis = *traversal.axis;
   report.slices = traversal.slices;
@@ -203,68 +185,26 @@ absl::Status DrawHalfAngleLight(const TraversalContext& context, LightReport& re
       ProjectParticles(gpu, context.buffers, order, light, "project particles for the light");
   if (!light_splats.ok()) return light_splats.status();
 
-  // Slice by slice: let the light spread up to the slice, deposit the slice, draw it.
-  context.clock.BeginGpu("light and composite");
-  LightBuffers buffers(traversal);
+  // Walk the slices: let the light spread up to each, deposit it, draw it.
   const CompositePass composite =
       PrepareComposite(context.scene, traversal, order, context.buffers, context.eye.projection,
                        *eye_splats, &light, &*light_splats, context.targets.front());
   const glm::dvec2 texels_per_unit = TexelsPerUnit(light_projection, context.particles);
-  const auto blur = [&](double from, double to) {
-    return BlurLightBuffer(gpu, buffers.before, buffers.scratch,
-                           spread->InTexels(from, to, texels_per_unit), source.shadow_density,
-                           ChannelsOf(traversal));
+  const SlicedLight sliced{
+      .order = order,
+      .light = light,
+      .splats = *light_splats,
+      .composite = composite,
+      .channels = ChannelsOf(traversal),
+      .blur =
+          [&](double from, double to, LightBuffer& buffer, LightBuffer& scratch) {
+            return BlurLightBuffer(gpu, buffer, scratch,
+                                   spread->InTexels(from, to, texels_per_unit),
+                                   source.shadow_density, ChannelsOf(traversal));
+          },
   };
-  const size_t slices = order.slice_begin.size() - 1;
-  shadow.light_layers = DescribeLightImage(traversal, static_cast<int>(slices));
-  for (size_t s = 0; s < slices; ++s) {
-    if (context.stop.stop_requested()) return absl::CancelledError("frame cancelled");
-    const uint32_t begin = order.slice_begin[s];
-    const uint32_t end = order.slice_begin[s + 1];
-    if (traversal.blur && s > 0) {
-      if (absl::Status status = blur(order.slice_position[s - 1], order.slice_position[s]);
-          !status.ok()) {
-        return status;
-      }
-    }
-    LightBuffer& deposit_into = traversal.interpolate ? buffers.after : buffers.before;
-    const auto deposit = [&] {
-      return DepositSlice(gpu, *light_splats, light, context.scene.material.profile,
-                          ChannelsOf(traversal), begin, end, deposit_into);
-    };
-    const auto draw = [&] {
-      const SliceLight slice_light{buffers.before, deposit_into};
-      return CompositeSlice(gpu, composite, begin, end, &slice_light, context.targets);
-    };
-    // Plain slicing sees the light without its own slice, interpolation the light on both sides.
-    absl::Status status;
-    if (traversal.interpolate) {
-      CopyLightBuffer(buffers.before, buffers.after);
-      status = deposit();
-      status.Update(draw());
-      std::swap(buffers.before, buffers.after);
-    } else {
-      status = draw();
-      status.Update(deposit());
-    }
-    if (!status.ok()) return status;
-    if (traversal.keep_layers) {
-      context.readback.Copy(buffers.before.texture,
-                            {.image = shadow.light_layers, .layer = static_cast<int>(s)});
-    }
-  }
-  if (traversal.keep_light_buffer) {
-    // The buffer stands at the middle of the last slice; shown is the light behind all particles.
-    if (traversal.blur) {
-      if (absl::Status status = blur(order.slice_position.back(), order.end_position);
-          !status.ok()) {
-        return status;
-      }
-    }
-    shadow.light_buffer = DescribeLightImage(traversal, 1);
-    context.readback.Copy(buffers.before.texture, {shadow.light_buffer});
-  }
-  return absl::OkStatus();
+  return traversal.in_tiles ? DrawSlicesInTiles(context, sliced, shadow)
+                            : DrawSlicesByBlending(context, sliced, shadow);
 }
 
 }  // namespace halflight

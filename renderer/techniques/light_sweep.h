@@ -1,7 +1,8 @@
 // Frames of the light sweep: particles in their exact order along each light, shadows fitted over
 // every footprint, the image composited front to back tile by tile. On a GPU, or on the CPU with
-// all cores and no GL: see SweepOn. Refuses scattering, light layers, and a shadow-casting light
-// among the particles.
+// all cores and no GL: see SweepOn. Where light scatters or light layers are shown the order along
+// the light is cut into slabs, on the CPU alone. Refuses a shadow-casting light among the
+// particles.
 #pragma once
 
 #include "renderer/shadow_technique.h"

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
+#include "renderer/frame_engine.h"
 #include "renderer/frame_plan.h"
 #include "renderer/gpu.h"
 #include "renderer/particle_view.h"
@@ -18,6 +19,7 @@ namespace halflight {
 
 struct TraversalContext {
   Gpu& gpu;
+  const DeviceInfo& device;
   FrameCache& cache;
   const Scene& scene;
   const Traversal& traversal;

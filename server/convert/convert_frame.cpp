@@ -78,6 +78,7 @@ absl::StatusOr<FrameJob> ConvertFrame(const v1::RenderFrameRequest& request,
     if (LeavesTechniqueOpen(request.scene().shadow())) {
       scene.shadow.technique = DefaultTechnique(job.request, device.software);
     }
+    scene.shadow.compositor = CompositorFor(scene.shadow.compositor, device.software);
     if (checks.ok() && !request.has_target()) {
       CheckTechnique(scene, limits, checks);
     }

@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include "renderer/light_buffer_size.h"
 #include "server/convert/enums.h"
 
 namespace halflight {
@@ -82,7 +83,11 @@ uint64_t PixelBytesOf(const ImageRequest& shown, const Scene& scene) {
   }
   uint64_t pixels = static_cast<uint64_t>(scene.camera.window.width) * scene.camera.window.height;
   if (IsSeenFromLight(shown.kind)) {
-    pixels = static_cast<uint64_t>(scene.shadow.light_buffer_size) * scene.shadow.light_buffer_size;
+    // Layers are half-angle slicing's alone; the other may yet be drawn by whichever takes more.
+    const auto technique = shown.kind == ImageKind::kLightLayers ? ShadowTechniqueKind::kHalfAngle
+                                                                 : ShadowTechniqueKind::kLightSweep;
+    const auto size = static_cast<uint64_t>(LargestLightBufferSize(scene.shadow, technique));
+    pixels = size * size;
   }
   if (shown.kind == ImageKind::kLightLayers) {
     pixels *= std::clamp<uint64_t>(scene.particles->size(), 1, scene.shadow.slices);

@@ -134,10 +134,11 @@ ShadowSettings ConvertShadow(const v1::Shadow& shadow, const ServerLimits& limit
   converted.interpolate = !shadow.has_interpolate() || shadow.interpolate();
   converted.spacing =
       FromProto(kSpacings, shadow.spacing(), converted.spacing, path + ".spacing", checks);
-  const auto default_size =
-      std::min<uint32_t>(converted.light_buffer_size, limits.max_light_buffer_size);
+  converted.compositor = FromProto(kCompositors, shadow.compositor(), converted.compositor,
+                                   path + ".compositor", checks);
+  converted.max_light_buffer_size = static_cast<int>(limits.max_light_buffer_size);
   converted.light_buffer_size = static_cast<int>(
-      checks.InRangeOr(path + ".light_buffer_size", shadow.light_buffer_size(), default_size,
+      checks.InRangeOr(path + ".light_buffer_size", shadow.light_buffer_size(), 0U,
                        {.low = static_cast<double>(kMinLightBufferSize),
                         .high = static_cast<double>(limits.max_light_buffer_size)}));
   if (shadow.has_fit_degree()) {
@@ -243,7 +244,8 @@ Scene ConvertScene(const v1::Scene& scene, std::shared_ptr<const ParticleSet> pa
 bool LeavesTechniqueOpen(const v1::Shadow& shadow) {
   return shadow.technique() == v1::SHADOW_TECHNIQUE_UNSPECIFIED && shadow.slices() == 0 &&
          !shadow.has_interpolate() && shadow.spacing() == v1::SLICE_SPACING_UNSPECIFIED &&
-         shadow.blur_mode() == v1::BLUR_MODE_UNSPECIFIED && shadow.blur_texels() == 0.0F;
+         shadow.blur_mode() == v1::BLUR_MODE_UNSPECIFIED && shadow.blur_texels() == 0.0F &&
+         shadow.compositor() == v1::SLICE_COMPOSITOR_UNSPECIFIED;
 }
 
 void CheckTechnique(const Scene& scene, const ServerLimits& limits, FieldChecks& checks) {
@@ -278,6 +280,7 @@ v1::Shadow DescribeShadow(const ShadowSettings& shadow) {
   described.set_blur_mode(ToProto(kBlurModes, shadow.blur_mode));
   described.set_blur_texels(shadow.blur_texels);
   described.set_fit_degree(shadow.fit_degree);
+  described.set_compositor(ToProto(kCompositors, shadow.compositor));
   return described;
 }
 

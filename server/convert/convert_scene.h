@@ -19,7 +19,7 @@ Scene ConvertScene(const v1::Scene& scene, std::shared_ptr<const ParticleSet> pa
                    const ServerLimits& limits, FieldChecks& checks);
 
 // Whether the settings leave the technique open: it is unset, and so is all that only slices have
-// (slices, interpolate, spacing, blur_mode, blur_texels).
+// (slices, interpolate, spacing, blur_mode, blur_texels, compositor).
 bool LeavesTechniqueOpen(const v1::Shadow& shadow);
 
 // What the technique of the scene needs of it. The scene has passed its checks.

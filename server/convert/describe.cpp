@@ -42,6 +42,8 @@ v1::FrameMetadata DescribeMetadata(const FrameJob& job, const FrameResult& resul
   metadata.set_particle_count(scene.particles->size());
   metadata.set_clamped_opacities(result.clamped_opacities);
   *metadata.mutable_shadow() = DescribeShadow(scene.shadow);
+  metadata.mutable_shadow()->set_light_buffer_size(
+      static_cast<uint32_t>(result.plan.light_buffer_size));
   Fill(*metadata.mutable_world_to_camera(), scene.camera.view_from_world);
   Fill(*metadata.mutable_world_to_ndc(), NdcFromWorld(scene.camera));
   for (const LightReport& light : result.lights) {
@@ -173,7 +175,8 @@ v1::OutputInfo DescribeEncoded(const OutputJob& output, const Image& image,
 ImageMetadata DescribeImage(const FrameJob& job, const MadeFrame& frame, const OutputJob& output,
                             const DeviceInfo& device, const std::string& server_version) {
   const Scene& scene = job.request.scene;
-  const v1::Shadow shadow = DescribeShadow(scene.shadow);
+  v1::Shadow shadow = DescribeShadow(scene.shadow);
+  shadow.set_light_buffer_size(static_cast<uint32_t>(frame.rendered.plan.light_buffer_size));
   const v1::Output described = DescribeOutput(output);
   ImageMetadata metadata;
   metadata.text = {
@@ -183,6 +186,7 @@ ImageMetadata DescribeImage(const FrameJob& job, const MadeFrame& frame, const O
       {"halflight:slices", fmt::format("{}", shadow.slices())},
       {"halflight:interpolate", shadow.interpolate() ? "true" : "false"},
       {"halflight:spacing", v1::SliceSpacing_Name(shadow.spacing())},
+      {"halflight:compositor", v1::SliceCompositor_Name(shadow.compositor())},
       {"halflight:lightBufferSize", fmt::format("{}", shadow.light_buffer_size())},
       {"halflight:blurMode", v1::BlurMode_Name(shadow.blur_mode())},
       {"halflight:blurTexels", fmt::format("{}", shadow.blur_texels())},

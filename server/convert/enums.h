@@ -33,10 +33,15 @@ inline constexpr std::array kTechniques = {
     EnumRow{v1::SHADOW_TECHNIQUE_HALF_ANGLE, ShadowTechniqueKind::kHalfAngle},
     EnumRow{v1::SHADOW_TECHNIQUE_REFERENCE, ShadowTechniqueKind::kReference},
     EnumRow{v1::SHADOW_TECHNIQUE_LIGHT_SWEEP, ShadowTechniqueKind::kLightSweep},
+    EnumRow{v1::SHADOW_TECHNIQUE_PARTICLE_SHADOW_MAP, ShadowTechniqueKind::kParticleShadowMap},
 };
 inline constexpr std::array kSpacings = {
     EnumRow{v1::SLICE_SPACING_EQUAL_COUNT, SliceSpacing::kEqualCount},
     EnumRow{v1::SLICE_SPACING_EQUAL_OPTICAL_DEPTH, SliceSpacing::kEqualOpticalDepth},
+};
+inline constexpr std::array kCompositors = {
+    EnumRow{v1::SLICE_COMPOSITOR_RASTER, SliceCompositor::kRaster},
+    EnumRow{v1::SLICE_COMPOSITOR_TILES, SliceCompositor::kTiles},
 };
 inline constexpr std::array kBlurModes = {
     EnumRow{v1::BLUR_MODE_DISTANCE, BlurMode::kDistance},

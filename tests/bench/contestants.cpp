@@ -19,6 +19,16 @@ Contestant LightSweep(int degree, int light_buffer_size) {
           shadow};
 }
 
+// Layers along the light in place of its exact order, fitted as the sweep is.
+Contestant Layered(int bins) {
+  ShadowSettings shadow;
+  shadow.technique = ShadowTechniqueKind::kParticleShadowMap;
+  shadow.slices = bins;
+  shadow.fit_degree = 3;
+  shadow.light_buffer_size = kLightBuffer;
+  return {absl::StrCat("layered, ", bins, " bins, degree 3"), Role::kOurs, shadow};
+}
+
 Contestant OnCpu(Contestant contestant) {
   contestant.name += ", on the CPU";
   contestant.sweep_on = SweepOn::kCpu;
@@ -38,10 +48,22 @@ Contestant Classic(Role role, int slices, bool interpolate) {
   shadow.technique = ShadowTechniqueKind::kHalfAngle;
   shadow.slices = slices;
   shadow.interpolate = interpolate;
+  shadow.compositor = SliceCompositor::kRaster;
   shadow.light_buffer_size = kLightBuffer;
   return {absl::StrCat("classic, ", slices, " slices", interpolate ? " interpolated" : ""), role,
           shadow};
 }
+
+namespace {
+
+// The same slices by tiles in compute.
+Contestant SlicesInTiles(int slices) {
+  ShadowSettings shadow = Classic(Role::kOurs, slices, true).shadow;
+  shadow.compositor = SliceCompositor::kTiles;
+  return {absl::StrCat("slices in tiles, ", slices, " interpolated"), Role::kOurs, shadow};
+}
+
+}  // namespace
 
 Contestant DefaultPath() {
   ShadowSettings shadow;
@@ -55,10 +77,13 @@ std::vector<Contestant> ListContestants(bool short_form, bool software) {
   std::vector<Contestant> all = {
       Classic(Role::kBaseline, 64, false),
       Classic(Role::kBaseline, 64, true),
+      SlicesInTiles(64),
   };
   if (!short_form) {
     all.push_back(Classic(Role::kClassic, 128, false));
     all.push_back(Classic(Role::kClassic, 128, true));
+    all.push_back(Layered(64));
+    all.push_back(Layered(128));
   }
   for (const int light_buffer_size : {kLightBuffer, 512}) {
     for (int degree = 0; degree <= kMaxFitDegree; ++degree) {

@@ -111,6 +111,8 @@ TEST(RenderFlags, SetEveryFieldOfTheRequest) {
                         "--plain",
                         "--spacing",
                         "optical-depth",
+                        "--compositor",
+                        "tiles",
                         "--light-buffer",
                         "1024",
                         "--blur-texels",
@@ -137,6 +139,7 @@ TEST(RenderFlags, SetEveryFieldOfTheRequest) {
                          "phase_g": -0.5, "scattering_spread": 0.125},
             "shadow": {"technique": "SHADOW_TECHNIQUE_HALF_ANGLE", "slices": 33,
                        "interpolate": false, "spacing": "SLICE_SPACING_EQUAL_OPTICAL_DEPTH",
+                       "compositor": "SLICE_COMPOSITOR_TILES",
                        "light_buffer_size": 1024, "blur_mode": "BLUR_MODE_TEXELS_PER_SLICE",
                        "blur_texels": 1.5},
             "sampling": {"supersample": 2}},
@@ -195,8 +198,9 @@ TEST(RenderFlags, TargetAndSettingsTakeEachOthersPlace) {
   ExpectJson(
       RequestOf({"--size", "10x10"}, *target),
       R"({"scene": {"camera": {"width": 10, "height": 10}}, "target": {"max_error": 0.05}})");
-  for (const char* flag : {"--technique=reference", "--slices=7", "--plain", "--spacing=count",
-                           "--light-buffer=64", "--blur=distance", "--blur-texels=2"}) {
+  for (const char* flag :
+       {"--technique=reference", "--slices=7", "--plain", "--spacing=count", "--compositor=tiles",
+        "--light-buffer=64", "--blur=distance", "--blur-texels=2"}) {
     const std::string name = std::string(flag).substr(0, std::string(flag).find('='));
     EXPECT_THAT(ErrorOf({flag, "--max-error", "0.05"}),
                 testing::AllOf(HasSubstr(name), HasSubstr("--max-error")));

@@ -24,6 +24,8 @@ v1::ShadowTechnique TechniqueOf(ShadowTechniqueKind kind) {
       return v1::SHADOW_TECHNIQUE_REFERENCE;
     case ShadowTechniqueKind::kLightSweep:
       return v1::SHADOW_TECHNIQUE_LIGHT_SWEEP;
+    case ShadowTechniqueKind::kParticleShadowMap:
+      return v1::SHADOW_TECHNIQUE_PARTICLE_SHADOW_MAP;
     case ShadowTechniqueKind::kHalfAngle:
       break;
   }
@@ -128,7 +130,8 @@ v1::RenderFrameRequest RequestWithoutParticles(const Scene& scene) {
   Set(scene.material, *message.mutable_material());
   v1::Shadow& shadow = *message.mutable_shadow();
   shadow.set_technique(TechniqueOf(scene.shadow.technique));
-  if (scene.shadow.technique == ShadowTechniqueKind::kLightSweep) {
+  if (scene.shadow.technique == ShadowTechniqueKind::kLightSweep ||
+      scene.shadow.technique == ShadowTechniqueKind::kParticleShadowMap) {
     shadow.set_fit_degree(scene.shadow.fit_degree);
   }
   shadow.set_slices(scene.shadow.slices);
@@ -136,6 +139,11 @@ v1::RenderFrameRequest RequestWithoutParticles(const Scene& scene) {
   shadow.set_spacing(scene.shadow.spacing == SliceSpacing::kEqualCount
                          ? v1::SLICE_SPACING_EQUAL_COUNT
                          : v1::SLICE_SPACING_EQUAL_OPTICAL_DEPTH);
+  if (scene.shadow.compositor != SliceCompositor::kAuto) {
+    shadow.set_compositor(scene.shadow.compositor == SliceCompositor::kRaster
+                              ? v1::SLICE_COMPOSITOR_RASTER
+                              : v1::SLICE_COMPOSITOR_TILES);
+  }
   shadow.set_light_buffer_size(scene.shadow.light_buffer_size);
   if (scene.shadow.blur_mode == BlurMode::kTexelsPerSlice) {
     shadow.set_blur_mode(v1::BLUR_MODE_TEXELS_PER_SLICE);

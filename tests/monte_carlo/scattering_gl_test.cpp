@@ -198,6 +198,11 @@ class JudgedLight : public ScatteredLight {
                    Light(WithArtistic(scene, c.spread, c.density)));
       const LightError physical =
           judge.Report("physical", Light(WithPhysical(scene, c.g, c.albedo)));
+      Scene swept = WithPhysical(scene, c.g, c.albedo);
+      swept.shadow.technique = ShadowTechniqueKind::kLightSweep;
+      const LightError of_sweep = judge.Report("physical, light sweep", Light(swept));
+      EXPECT_NEAR(of_sweep.relative_rmse, physical.relative_rmse, 0.01);
+      EXPECT_LT(of_sweep.relative_rmse, c.physical_rmse);
       EXPECT_LT(physical.relative_rmse, c.physical_rmse);
       EXPECT_LT(physical.relative_rmse, 0.5 * none.relative_rmse);
       EXPECT_LT(std::abs(physical.bias), 0.5 * std::abs(none.bias));

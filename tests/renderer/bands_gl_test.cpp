@@ -108,6 +108,19 @@ INSTANTIATE_TEST_SUITE_P(
                              }}),
     [](const auto& instance) { return instance.param.name; });
 
+// Tiles begin with their band, and sums are cut where tiles' lists are.
+TEST_F(Bands, OfTilesShowWhatIsDrawnAtOnceButForRounding) {
+  FrameRequest request = Request();
+  request.scene.sampling.supersample = 3;
+  request.scene.shadow.compositor = SliceCompositor::kTiles;
+  const FrameResult whole = Render(request);
+  absl::StatusOr<FrameResult> bands = SmallRenderer().Render(request, {});
+  ASSERT_TRUE(bands.ok()) << bands.status();
+  for (const size_t i : {0, 1, 3, 4, 5, 6}) {  // depth is infinite in places
+    EXPECT_LT(test::MaxDifference(bands->images[i], whole.images[i]), 5e-6) << "output " << i;
+  }
+}
+
 TEST_F(Bands, LightBuffersStayWithinTheDevice) {
   FrameRequest request = Request();
   request.scene.shadow.light_buffer_size = kMaxSide + 1;

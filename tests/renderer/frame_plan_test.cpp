@@ -87,6 +87,19 @@ TEST(PlanFrame, CopiesTheLightBufferOnlyToInterpolate) {
   EXPECT_THAT(Plan(request).passes, Not(Contains(PassNamed("copy light buffer"))));
 }
 
+TEST(PlanFrame, NamesWhatComposites) {
+  FrameRequest request = test::Beauty(test::BallScene(100));
+  for (const bool shadows : {true, false}) {
+    if (!shadows) request.scene.lights[0].shadow_density = glm::vec3(0.0F);
+    request.scene.shadow.compositor = SliceCompositor::kRaster;
+    EXPECT_THAT(Plan(request).passes, Contains(PassNamed("composite")));
+    EXPECT_THAT(Plan(request).passes, Not(Contains(PassNamed("in tiles"))));
+    request.scene.shadow.compositor = SliceCompositor::kTiles;
+    EXPECT_THAT(Plan(request).passes, Contains(PassNamed("composite slices in tiles")));
+    EXPECT_THAT(Plan(request).passes, Not(Contains(PassNamed("copy light buffer"))));
+  }
+}
+
 TEST(PlanFrame, KeepsOnlyWhatOutputsShow) {
   FrameRequest request = test::Beauty(test::BallScene(100));
   FramePlan plan = Plan(request);

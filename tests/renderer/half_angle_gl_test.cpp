@@ -70,11 +70,17 @@ TEST_P(PlumeLit, IsHalfAngleSlicingWithinHalfAPercent) {
   if (c.varied) test::VaryParticles(scene, 0.05F, 0.4F);
   if (c.orthographic) scene.camera.projection = Orthographic{3.4};
   const oracle::OracleImage reference = oracle::RenderHalfAngle(scene, {.stride = kStride});
-  const oracle::ImageError error = oracle::CompareColor(RenderBeauty(scene), reference);
+  scene.shadow.compositor = SliceCompositor::kRaster;
+  const Image image = RenderBeauty(scene);
+  const oracle::ImageError error = oracle::CompareColor(image, reference);
   RecordProperty("relative_rmse", std::to_string(error.relative_rmse));
   RecordProperty("bias", std::to_string(error.bias));
   std::cout << c.name << ": " << error.ToString() << "\n";
   EXPECT_LT(error.relative_rmse, 0.005);
+  scene.shadow.compositor = SliceCompositor::kTiles;
+  const double rounding = test::MaxDifference(RenderBeauty(scene), image);
+  RecordProperty("tiles_against_raster", std::to_string(rounding));
+  EXPECT_LT(rounding, 2e-5);
 }
 
 INSTANTIATE_TEST_SUITE_P(

@@ -46,6 +46,8 @@ const char* FlagOf(ShadowTechniqueKind technique) {
       return "reference";
     case ShadowTechniqueKind::kLightSweep:
       return "light-sweep";
+    case ShadowTechniqueKind::kParticleShadowMap:
+      return "particle-shadow-map";
   }
   return "";
 }

@@ -10,6 +10,7 @@
 #include <glm/vec4.hpp>
 
 #include "server/convert/convert_frame.h"
+#include "server/convert/convert_scene.h"
 #include "server/convert/describe.h"
 #include "server/convert/geometry.h"
 #include "tests/server/fake_engine.h"
@@ -42,7 +43,8 @@ TEST(ConvertRequest, FillsInTheDefaultsOfTheManual) {
   EXPECT_EQ(scene.material.ambient, glm::vec3(0.1F));
   EXPECT_EQ(scene.shadow.slices, 128);
   EXPECT_TRUE(scene.shadow.interpolate);
-  EXPECT_EQ(scene.shadow.light_buffer_size, 512);
+  EXPECT_EQ(scene.shadow.light_buffer_size, 0);  // left to the plan
+  EXPECT_EQ(scene.shadow.max_light_buffer_size, 4096);
   EXPECT_EQ(scene.lights[0].color, glm::vec3(1.0F));
   EXPECT_EQ(scene.lights[0].shadow_density, glm::vec3(1.0F));
   EXPECT_EQ(scene.sampling.supersample, 1);
@@ -208,7 +210,48 @@ TEST(ConvertTechnique, IsTheSweepOnACpuWhereTheRequestLeavesItOpen) {
   EXPECT_EQ(TechniqueOf(request, true), ShadowTechniqueKind::kHalfAngle);
 }
 
-// Whatever only slices have, or the sweep refuses, asks for slices.
+TEST(ConvertCompositor, IsByTheDeviceWhereTheRequestLeavesItOpen) {
+  v1::RenderFrameRequest request = MakeRequest();
+  const auto compositor_of = [&](bool software) {
+    ParticleStore store(1 << 20);
+    const auto job = ConvertRequest(
+        request, store, {}, {.gl_renderer = "fake", .gl_version = {}, .software = software});
+    EXPECT_TRUE(job.ok()) << job.status();
+    return job.ok() ? DescribeShadow(job->request.scene.shadow).compositor()
+                    : v1::SLICE_COMPOSITOR_UNSPECIFIED;
+  };
+  EXPECT_EQ(compositor_of(true), v1::SLICE_COMPOSITOR_RASTER);
+  EXPECT_EQ(compositor_of(false), v1::SLICE_COMPOSITOR_TILES);
+  for (const auto asked : {v1::SLICE_COMPOSITOR_RASTER, v1::SLICE_COMPOSITOR_TILES}) {
+    request.mutable_scene()->mutable_shadow()->set_compositor(asked);
+    EXPECT_EQ(compositor_of(true), asked);
+    EXPECT_EQ(compositor_of(false), asked);
+  }
+}
+
+// Scattering and layers the sweep has itself.
+TEST(ConvertTechnique, IsTheSweepOnACpuWhereLightScattersOrShowsItsLayers) {
+  using Change = void (*)(v1::RenderFrameRequest&);
+  const Change changes[] = {
+      [](v1::RenderFrameRequest& r) {
+        r.mutable_scene()->mutable_material()->set_scattering_spread(0.1F);
+      },
+      [](v1::RenderFrameRequest& r) {
+        r.mutable_scene()->mutable_material()->mutable_physical_scattering();
+      },
+      [](v1::RenderFrameRequest& r) { r.add_outputs()->set_kind(v1::OUTPUT_KIND_LIGHT_LAYERS); },
+  };
+  for (const Change& change : changes) {
+    v1::RenderFrameRequest request = MakeRequest();
+    change(request);
+    EXPECT_EQ(TechniqueOf(request, true), ShadowTechniqueKind::kLightSweep)
+        << request.ShortDebugString();
+    EXPECT_EQ(TechniqueOf(request, false), ShadowTechniqueKind::kHalfAngle)
+        << request.ShortDebugString();
+  }
+}
+
+// Whatever is set of slices asks for them.
 TEST(ConvertTechnique, IsSlicesWhereTheRequestNeedsThem) {
   using Change = void (*)(v1::RenderFrameRequest&);
   const Change changes[] = {
@@ -218,15 +261,11 @@ TEST(ConvertTechnique, IsSlicesWhereTheRequestNeedsThem) {
         r.mutable_scene()->mutable_shadow()->set_spacing(v1::SLICE_SPACING_EQUAL_COUNT);
       },
       [](v1::RenderFrameRequest& r) {
+        r.mutable_scene()->mutable_shadow()->set_compositor(v1::SLICE_COMPOSITOR_RASTER);
+      },
+      [](v1::RenderFrameRequest& r) {
         r.mutable_scene()->mutable_shadow()->set_blur_mode(v1::BLUR_MODE_DISTANCE);
       },
-      [](v1::RenderFrameRequest& r) {
-        r.mutable_scene()->mutable_material()->set_scattering_spread(0.1F);
-      },
-      [](v1::RenderFrameRequest& r) {
-        r.mutable_scene()->mutable_material()->mutable_physical_scattering();
-      },
-      [](v1::RenderFrameRequest& r) { r.add_outputs()->set_kind(v1::OUTPUT_KIND_LIGHT_LAYERS); },
   };
   for (const Change& change : changes) {
     v1::RenderFrameRequest request = MakeRequest();

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "halflight/particle_payload.h"
+#include "renderer/light_buffer_size.h"
 
 namespace halflight::testing {
 
@@ -95,6 +96,8 @@ void FakeEngine::Work() {
       for (size_t i = 0; i < job.request.images.size(); ++i) {
         frame.images.push_back(FakeImage(job.request.scene, job.request.images[i], i));
       }
+      const ShadowSettings& shadow = job.request.scene.shadow;
+      frame.plan.light_buffer_size = LargestLightBufferSize(shadow, shadow.technique);
       frame.plan.passes.push_back({"pretend", "this is a test", 1});
       for (const Light& light : job.request.scene.lights) {
         frame.lights.push_back({.casts_shadows = light.casts_shadows(), .slices = 2});
@@ -115,8 +118,9 @@ Image FakeImage(const Scene& scene, const ImageRequest& shown, size_t index) {
   Image image;
   const bool from_light =
       shown.kind == ImageKind::kLightBuffer || shown.kind == ImageKind::kLightLayers;
-  image.width = from_light ? scene.shadow.light_buffer_size : scene.camera.window.width;
-  image.height = from_light ? scene.shadow.light_buffer_size : scene.camera.window.height;
+  const int texels = LargestLightBufferSize(scene.shadow, scene.shadow.technique);
+  image.width = from_light ? texels : scene.camera.window.width;
+  image.height = from_light ? texels : scene.camera.window.height;
   image.channels = {"Y"};
   if (shown.kind == ImageKind::kBeauty) {
     image.channels = {"R", "G", "B", "A"};

@@ -278,6 +278,10 @@ INSTANTIATE_TEST_SUITE_P(
         Refusal{"ReferenceOfTooMuch",
                 [](Request& r) { ShadowOf(r).set_technique(v1::SHADOW_TECHNIQUE_REFERENCE); },
                 "scene.shadow.technique: SHADOW_TECHNIQUE_REFERENCE of "},
+        Refusal{"CompositorUnknown",
+                [](Request& r) { ShadowOf(r).set_compositor(static_cast<v1::SliceCompositor>(7)); },
+                "scene.shadow.compositor: 7, allowed: SLICE_COMPOSITOR_RASTER, "
+                "SLICE_COMPOSITOR_TILES"},
         Refusal{"SpacingUnknown",
                 [](Request& r) { ShadowOf(r).set_spacing(static_cast<v1::SliceSpacing>(-1)); },
                 "scene.shadow.spacing: -1"},

@@ -38,11 +38,11 @@ class EyePass {
     const glm::ivec2 size(scene.camera.window.width, scene.camera.window.height);
     eye_ = EyeProjection(scene.camera, size, 1.0);
     list_ = ListSprites(particles_, eye_, NearDepth(scene));
-    for (const Light& light : scene_.lights) {
+    for (size_t light = 0; light < scene_.lights.size(); ++light) {
       fits_.emplace_back();
-      if (!light.casts_shadows()) continue;
-      auto fit = FitLight(light, particles_, scene.material.profile, scene.shadow.light_buffer_size,
-                          scene.shadow.fit_degree, {});
+      if (!scene_.lights[light].casts_shadows()) continue;
+      auto fit =
+          FitLight(scene_, particles_, PlanLight(scene_, particles_, static_cast<int>(light)), {});
       EXPECT_TRUE(fit.ok()) << fit.status();
       if (fit.ok()) fits_.back() = *std::move(fit);
     }

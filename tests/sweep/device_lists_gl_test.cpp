@@ -232,8 +232,8 @@ TEST_P(ListDeviceSpritesOf, HasTheTilesOfTheCpu) {
   for (const int tile_size : {8, 64, 128}) {
     const TileLists expected = ListTiles(rects, cloud.target.size, tile_size);
     const DeviceTiles uploaded = UploadTiles(expected);
-    const absl::StatusOr<DeviceTiles> lists =
-        ListDeviceTiles(Device(), *sprites, {0, sprites->count}, cloud.target.size, tile_size);
+    const absl::StatusOr<DeviceTiles> lists = ListDeviceTiles(
+        Device(), sprites->rects, {0, sprites->count}, cloud.target.size, tile_size);
     ASSERT_TRUE(lists.ok()) << lists.status();
     EXPECT_EQ(lists->tiles, uploaded.tiles);
     EXPECT_EQ(lists->tile_size, tile_size);
@@ -262,7 +262,7 @@ TEST_F(DeviceListsTest, OfRunsTogetherAreTheTilesOfAll) {
   const size_t ends[] = {0, 1, 33, 33, 7001, list.rects.size()};
   for (size_t r = 0; r + 1 < std::size(ends); ++r) {
     const absl::StatusOr<DeviceTiles> run =
-        ListDeviceTiles(Device(), sprites, {ends[r], ends[r + 1]}, kSize, 8);
+        ListDeviceTiles(Device(), sprites.rects, {ends[r], ends[r + 1]}, kSize, 8);
     ASSERT_TRUE(run.ok()) << run.status();
     const auto begin = test::ReadBuffer<uint32_t>(run->begin, tiles + 1);
     const auto places = test::ReadBuffer<uint32_t>(run->entries, run->entry_count);
@@ -324,7 +324,7 @@ TEST_F(DeviceListsTest, AreTheSameEveryTime) {
   for (int repeat = 0; repeat < 5; ++repeat) {
     const auto sprites = ListDeviceSprites(Device(), buffers, particles, cloud.target);
     ASSERT_TRUE(sprites.ok()) << sprites.status();
-    const auto tiles = ListDeviceTiles(Device(), *sprites, {0, sprites->count}, kSize, 8);
+    const auto tiles = ListDeviceTiles(Device(), sprites->rects, {0, sprites->count}, kSize, 8);
     ASSERT_TRUE(tiles.ok()) << tiles.status();
     auto entries = test::ReadBuffer<uint32_t>(tiles->entries, tiles->entry_count);
     if (repeat == 0) first = entries;
@@ -339,7 +339,7 @@ TEST_F(DeviceListsTest, NamesTheLimitThatTooManyEntriesExceed) {
   list.sprites.resize(2000);
   list.rects.resize(2000, {0, 65535, 0, 65535});
   const absl::Status status =
-      ListDeviceTiles(Device(), UploadSprites(list), {0, 2000}, {65535, 65535}, 32).status();
+      ListDeviceTiles(Device(), UploadSprites(list).rects, {0, 2000}, {65535, 65535}, 32).status();
   EXPECT_EQ(status.code(), absl::StatusCode::kResourceExhausted);
   EXPECT_NE(status.message().find("GL_MAX_SHADER_STORAGE_BLOCK_SIZE"), std::string::npos) << status;
 }
@@ -351,7 +351,7 @@ TEST_F(DeviceListsTest, ListAParticleOverAsManyTilesAsThereAre) {
   list.particles = {0, 1, 2};
   list.sprites.resize(3);
   list.rects = {{5, 6, 9, 10}, {0, 4096, 0, 4000}, {}};
-  const auto tiles = ListDeviceTiles(Device(), UploadSprites(list), {0, 3}, kLarge, 8);
+  const auto tiles = ListDeviceTiles(Device(), UploadSprites(list).rects, {0, 3}, kLarge, 8);
   ASSERT_TRUE(tiles.ok()) << tiles.status();
   const TileLists expected = ListTiles(list.rects, kLarge, 8);
   ASSERT_EQ(tiles->entry_count, size_t{512} * 500 + 1);

@@ -67,8 +67,7 @@ std::vector<Sprite> SpritesByParticle(const ParticleView& particles, const Proje
 FittedLight FitOnCpu(const Scene& scene) {
   const ParticleView particles(scene);
   const absl::StatusOr<LightFit> fit =
-      FitLight(scene.lights[0], particles, scene.material.profile, scene.shadow.light_buffer_size,
-               scene.shadow.fit_degree, {});
+      FitLight(scene, particles, PlanLight(scene, particles, 0), {});
   return {{fit->depth.begin(), fit->depth.end()},
           SpritesByParticle(particles, fit->projection),
           fit->optical_depth.pixels};

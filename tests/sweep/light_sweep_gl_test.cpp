@@ -288,16 +288,26 @@ TEST_F(LightSweep, RefusesWhatItHasNot) {
     const char* field;
   };
   const Refusal refusals[] = {
-      {[](FrameRequest& r) { r.scene.material.scattering_spread = 0.1F; },
-       "material.scattering_spread: 0.1, allowed under technique LIGHT_SWEEP: "},
-      {[](FrameRequest& r) { r.scene.material.physical_scattering.emplace(); },
-       "material.physical_scattering.albedo: 1, allowed under technique LIGHT_SWEEP: "},
+      {[](FrameRequest& r) {
+         r.sweep_on = SweepOn::kDevice;
+         r.scene.material.scattering_spread = 0.1F;
+       },
+       "material.scattering_spread: 0.1, allowed under technique LIGHT_SWEEP on the device: "},
+      {[](FrameRequest& r) {
+         r.sweep_on = SweepOn::kDevice;
+         r.scene.material.physical_scattering.emplace();
+       },
+       "material.physical_scattering.albedo: 1, allowed under technique LIGHT_SWEEP on the "
+       "device: "},
       {[](FrameRequest& r) {
          r.scene.lights = {Point({0, 1, 0}, false)};
        },
        "lighting.lights[0].point.position: (0, 1, 0), allowed under technique LIGHT_SWEEP: "},
-      {[](FrameRequest& r) { r.images.push_back({ImageKind::kLightLayers}); },
-       "outputs: light layers, allowed under technique LIGHT_SWEEP: "},
+      {[](FrameRequest& r) {
+         r.sweep_on = SweepOn::kDevice;
+         r.images.push_back({ImageKind::kLightLayers});
+       },
+       "outputs: light layers, allowed under technique LIGHT_SWEEP on the device: "},
   };
   for (const Refusal& refusal : refusals) {
     FrameRequest request = test::Beauty(PlumeScene());

@@ -70,11 +70,12 @@ struct Peaks {
 Peaks PeaksOf(size_t count) {
   Scene scene = test::BallScene(count, 640);
   scene.material.radius = 0.01F;
+  scene.shadow.light_buffer_size = 256;
   const ParticleView particles(scene);
   LightFit fit;
   Peaks peaks{};
-  peaks.light = static_cast<double>(PeakOf(
-      [&] { fit = *FitLight(scene.lights[0], particles, scene.material.profile, 256, 4, {}); }));
+  peaks.light = static_cast<double>(
+      PeakOf([&] { fit = *FitLight(scene, particles, PlanLight(scene, particles, 0), {}); }));
   peaks.eye = static_cast<double>(PeakOf([&] {
     const glm::ivec2 size(640, 640);
     const Projection eye = EyeProjection(scene.camera, size, 1.0);

@@ -16,13 +16,16 @@ namespace {
 Scene MakeScene() {
   Scene scene = test::BallScene(3000, 150);
   test::VaryParticles(scene, 0.1F, 0.3F);
+  scene.shadow.light_buffer_size = 200;
+  scene.shadow.fit_degree = 3;
   scene.camera.view_from_world = glm::translate(scene.camera.view_from_world, {0.0, 0.0, 3.2});
   return scene;
 }
 
 LightFit Fit(const Scene& scene, const RunLimits& limits) {
+  const ParticleView particles(scene);
   absl::StatusOr<LightFit> fit =
-      FitLight(scene.lights[0], ParticleView(scene), scene.material.profile, 200, 3, {}, limits);
+      FitLight(scene, particles, PlanLight(scene, particles, 0), {}, limits);
   EXPECT_TRUE(fit.ok());
   return *std::move(fit);
 }

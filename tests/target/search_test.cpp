@@ -326,7 +326,19 @@ TEST(TargetCandidates, LeaveOutWhatTheSceneForbids) {
   };
   EXPECT_THAT(list({}, kBeauty).refusals, ::testing::IsEmpty());
   EXPECT_THAT(list({}, {{ImageKind::kLightLayers}}).refusals,
-              ::testing::ElementsAre(HasSubstr("light buffer"), HasSubstr("light layers")));
+              ::testing::ElementsAre(HasSubstr("light buffer")));
+  // Light that scatters leaves the two that have a buffer in which to spread it, each with slices.
+  Scene scattering = scene;
+  scattering.material.scattering_spread = 0.1F;
+  const Candidates scatters =
+      ListCandidates(scattering, FeaturesOf(scattering), kBeauty, TargetLimits{.max_slices = 40});
+  EXPECT_THAT(scatters.refusals, ::testing::ElementsAre(HasSubstr("REFERENCE cannot")));
+  bool swept = false;
+  for (const Settings& settings : scatters.settings) {
+    EXPECT_LE(settings.shadow.slices, 40);
+    swept |= settings.shadow.technique == ShadowTechniqueKind::kLightSweep;
+  }
+  EXPECT_TRUE(swept);
   for (const Settings& settings : list({}, kBeauty).settings) {
     EXPECT_EQ(settings.sampling.downsample, 1);
   }

@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "renderer/bands.h"
 #include "renderer/frame_cache.h"
@@ -39,14 +40,14 @@ struct DeviceFitKey {
   bool operator==(const DeviceFitKey&) const = default;
 };
 
-DeviceFitKey FitKeyOf(const Scene& scene, const Light& light) {
+DeviceFitKey FitKeyOf(const Scene& scene, const Light& light, const FramePlan& plan) {
   const auto* const point = std::get_if<PointLight>(&light.kind);
   return {.particles = ParticleViewKeyOf(scene),
           .point = point != nullptr,
           .place =
               point != nullptr ? point->position : std::get<DirectionalLight>(light.kind).direction,
           .profile = scene.material.profile,
-          .light_buffer_size = scene.shadow.light_buffer_size,
+          .light_buffer_size = plan.light_buffer_size,
           .degree = scene.shadow.fit_degree};
 }
 
@@ -91,17 +92,19 @@ absl::StatusOr<std::shared_ptr<const DeviceLightFit>> FitOf(const DrawContext& c
                                                             size_t light, DrawnFrame& frame) {
   const Scene& scene = context.request.scene;
   bool made = false;
-  auto fit = context.cache.FindOrMake(scene.particles, FitKeyOf(scene, scene.lights[light]), [&] {
-    made = true;
-    return FitLightOnDevice(context.gpu, scene.lights[light], context.particles, buffers,
-                            scene.material.profile, scene.shadow.light_buffer_size,
-                            scene.shadow.fit_degree, context.stop,
-                            LightSweepSettingsFor(context.device));
-  });
+  auto fit = context.cache.FindOrMake(
+      scene.particles, FitKeyOf(scene, scene.lights[light], context.plan), [&] {
+        made = true;
+        return FitLightOnDevice(context.gpu, scene.lights[light], context.particles, buffers,
+                                scene.material.profile, context.plan.light_buffer_size,
+                                scene.shadow.fit_degree, context.stop,
+                                LightSweepSettingsFor(context.device));
+      });
   if (!made) {
     const std::string reason = absl::StrCat("light ", light, " casts shadows");
     MarkKept(
-        context.plan, [&](const PlannedPass& pass) { return pass.reason == reason; }, frame);
+        context.plan,
+        [&](const PlannedPass& pass) { return absl::StartsWith(pass.reason, reason); }, frame);
   }
   return fit;
 }
@@ -141,7 +144,7 @@ absl::StatusOr<std::shared_ptr<const EyeRuns>> RunsOf(const DrawContext& context
         if (!runs.ok()) return runs.status();
         made.runs = *std::move(runs);
         if (made.runs.size() == 1) {
-          auto tiles = ListDeviceTiles(context.gpu, sprites, made.runs[0].places,
+          auto tiles = ListDeviceTiles(context.gpu, sprites.rects, made.runs[0].places,
                                        key.sprites.eye.size, key.tile_size, made.runs[0].entries);
           if (!tiles.ok()) return tiles.status();
           made.tiles = *std::move(tiles);
@@ -201,7 +204,7 @@ absl::Status CompositeRuns(const DrawContext& context, const SeenScene& seen, co
     if (eye.runs.size() > 1) {
       context.clock.BeginGpu("project");
       absl::StatusOr<DeviceTiles> tiles =
-          ListDeviceTiles(context.gpu, seen.sprites, run.places, seen.eye.projection.size,
+          ListDeviceTiles(context.gpu, seen.sprites.rects, run.places, seen.eye.projection.size,
                           walk.tile_size, run.entries);
       if (!tiles.ok()) return tiles.status();
       listed = *std::move(tiles);

@@ -77,8 +77,9 @@ absl::Status SweepAndFit(Gpu& gpu, const LightPasses& passes, const TargetProjec
                          const DeviceLightFit& fit, const std::stop_token& stop) {
   for (const PatchRun& run : passes.patch_runs.runs) {
     if (stop.stop_requested()) return absl::CancelledError("frame cancelled");
-    absl::StatusOr<DeviceTiles> tiles = ListDeviceTiles(
-        gpu, passes.sprites, run.places, target.projection.size, passes.light_tile, run.entries);
+    absl::StatusOr<DeviceTiles> tiles =
+        ListDeviceTiles(gpu, passes.sprites.rects, run.places, target.projection.size,
+                        passes.light_tile, run.entries);
     if (!tiles.ok()) return tiles.status();
     const gl::Buffer block = BindRun(run, target.projection.size.x);
     glBindBufferBase(GL_UNIFORM_BUFFER, shader::kProjectionBinding, target.block.name());

@@ -51,18 +51,17 @@ absl::Status Run(Gpu& gpu, const gl::ProgramSource& source, const shader::TilesB
 }
 
 // Binds the rectangles of the run from the nearest place before it at which a binding may begin.
-void BindRects(const DeviceSprites& sprites, const PlaceRun& run, shader::TilesBlock& block) {
+void BindRects(const gl::Buffer& rects, const PlaceRun& run, shader::TilesBlock& block) {
   const size_t first = run.first / kAlignedPlaces * kAlignedPlaces;
   block.run = {run.first - first, run.end - run.first, run.first, 0U};
-  gl::BindStorage(shader::kTileRectsBinding, sprites.rects, sizeof(glm::uvec2),
-                  {first, run.end - first});
+  gl::BindStorage(shader::kTileRectsBinding, rects, sizeof(glm::uvec2), {first, run.end - first});
 }
 
 }  // namespace
 
-absl::StatusOr<DeviceTiles> ListDeviceTiles(Gpu& gpu, const DeviceSprites& sprites,
-                                            const PlaceRun& run, const glm::ivec2& target_size,
-                                            int tile_size, std::optional<size_t> entry_count) {
+absl::StatusOr<DeviceTiles> ListDeviceTiles(Gpu& gpu, const gl::Buffer& rects, const PlaceRun& run,
+                                            const glm::ivec2& target_size, int tile_size,
+                                            std::optional<size_t> entry_count) {
   const gl::DebugScope scope("list tiles");
   const size_t places = run.end - run.first;
   DeviceTiles lists;
@@ -86,7 +85,7 @@ absl::StatusOr<DeviceTiles> ListDeviceTiles(Gpu& gpu, const DeviceSprites& sprit
 
   // Count.
   const gl::Buffer begins = gl::MakeBuffer("entry begins", (places + 1) * sizeof(uint32_t));
-  BindRects(sprites, run, block);
+  BindRects(rects, run, block);
   gl::BindStorage(shader::kEntryBeginsBinding, begins);
   if (absl::Status status = Run(gpu, CountsProgram(), block, places); !status.ok()) return status;
 
@@ -102,7 +101,7 @@ absl::StatusOr<DeviceTiles> ListDeviceTiles(Gpu& gpu, const DeviceSprites& sprit
 
   // Write entries by place, and sort them by tile.
   KeyedValues entries{gl::MakeBuffer("entry tiles", bytes), gl::MakeBuffer("entry places", bytes)};
-  BindRects(sprites, run, block);
+  BindRects(rects, run, block);
   gl::BindStorage(shader::kEntryBeginsBinding, begins);
   gl::BindStorage(shader::kEntryTilesBinding, entries.keys);
   gl::BindStorage(shader::kEntryPlacesBinding, entries.values);
@@ -115,7 +114,7 @@ absl::StatusOr<DeviceTiles> ListDeviceTiles(Gpu& gpu, const DeviceSprites& sprit
   if (!sorted.ok()) return sorted.status();
 
   // Find where tiles begin.
-  gl::BindStorage(shader::kTileRectsBinding, sprites.rects);
+  gl::BindStorage(shader::kTileRectsBinding, rects);
   gl::BindStorage(shader::kEntryTilesBinding, sorted->keys);
   gl::BindStorage(shader::kTileBeginsBinding, lists.begin);
   if (absl::Status status = Run(gpu, BeginsProgram(), block, tile_count + 1); !status.ok()) {

@@ -60,14 +60,13 @@ absl::StatusOr<DeviceSprites> ListDeviceSprites(Gpu& gpu, const ParticleBuffers&
                                                 const ParticleView& particles,
                                                 const Projection& target, double near_depth = 0.0);
 
-// ListTiles() of a run of places, entry for entry the CPU's; entries are places of the whole order.
-// `entry_count`: how many there are, as runs.h tells for many runs at once; without it waits for
-// the device to tell. 4 bytes an entry and a tile; 12 an entry
-// and 4 a place more while it works. ResourceExhausted where a storage block does not hold 4 bytes
-// an entry or 8 a place: shorter runs then fit. Needs a current context.
-absl::StatusOr<DeviceTiles> ListDeviceTiles(Gpu& gpu, const DeviceSprites& sprites,
-                                            const PlaceRun& run, const glm::ivec2& target_size,
-                                            int tile_size,
+// ListTiles() of a run of places, entry for entry the CPU's; entries are places of the whole order,
+// by whose place `rects` are, as in DeviceSprites. `entry_count`: how many there are, as runs.h
+// tells for many runs at once; without it waits for the device to tell. 4 bytes an entry and a
+// tile; 12 an entry and 4 a place more while it works. ResourceExhausted where a storage block does
+// not hold 4 bytes an entry or 8 a place: shorter runs then fit. Needs a current context.
+absl::StatusOr<DeviceTiles> ListDeviceTiles(Gpu& gpu, const gl::Buffer& rects, const PlaceRun& run,
+                                            const glm::ivec2& target_size, int tile_size,
                                             std::optional<size_t> entry_count = std::nullopt);
 
 // Copy lists made on the CPU. Need a current context.
