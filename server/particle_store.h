@@ -27,8 +27,9 @@ class ParticleStore {
   // Whatever their size: what a set takes beside its values is not counted.
   static constexpr size_t kMaxSets = 65536;
 
+  explicit ParticleStore(uint64_t max_bytes);
   // `files`: the cache directory; null where there is none.
-  explicit ParticleStore(uint64_t max_bytes, std::unique_ptr<ParticleFiles> files = nullptr);
+  ParticleStore(uint64_t max_bytes, std::unique_ptr<ParticleFiles> files);
   // Finishes what waits to be read from disk and written to it.
   ~ParticleStore();
   ParticleStore(const ParticleStore&) = delete;
