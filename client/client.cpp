@@ -9,6 +9,7 @@
 #include "client/frame_calls.h"
 #include "client/frame_reader.h"
 #include "client/readers/text.h"
+#include "client/security.h"
 #include "client/status_text.h"
 #include "halflight/sha256.h"
 
@@ -49,13 +50,18 @@ std::optional<std::chrono::milliseconds> RetryHint(const grpc::ClientContext& co
   return ms && *ms < 3600000 ? std::optional(std::chrono::milliseconds(*ms)) : std::nullopt;
 }
 
-void SetRoute(grpc::ClientContext& context, std::string_view route) {
+void SetMetadata(grpc::ClientContext& context, std::string_view route, const std::string& token) {
   if (!route.empty()) {
     context.AddMetadata("halflight-particle-sha256", ToHex(route));
   }
+  if (!token.empty()) {
+    context.AddMetadata("authorization", "Bearer " + token);
+  }
 }
 
-Client::Impl::Impl(const std::string& address, ClientOptions options)
+Client::Impl::Impl(const std::string& address,
+                   const std::shared_ptr<grpc::ChannelCredentials>& credentials,
+                   ClientOptions options)
     : address_(address), options_(std::move(options)) {
   grpc::ChannelArguments arguments;
   arguments.SetMaxReceiveMessageSize(kMaxReceivedBytes);
@@ -67,7 +73,7 @@ Client::Impl::Impl(const std::string& address, ClientOptions options)
   // Despite its name, how long one attempt to connect may take.
   arguments.SetInt(GRPC_ARG_MIN_RECONNECT_BACKOFF_MS, 10000);
   arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
-  channel_ = grpc::CreateCustomChannel(address, grpc::InsecureChannelCredentials(), arguments);
+  channel_ = grpc::CreateCustomChannel(address, credentials, arguments);
   stub_ = v1::RenderService::NewStub(channel_);
 }
 
@@ -97,7 +103,7 @@ absl::Status Client::Impl::Try(std::string_view route, const std::stop_token& st
     if (has_deadline) {
       context.set_deadline(deadline);
     }
-    SetRoute(context, route);
+    SetMetadata(context, route, options_.security.token);
     absl::Status status;
     {
       const std::stop_callback cancel(stop, [&context] { context.TryCancel(); });
@@ -158,7 +164,7 @@ absl::StatusOr<v1::QueryUploadResponse> Client::Impl::QueryUpload(
     const std::stop_token& stop) {
   grpc::ClientContext query;
   query.set_deadline(context.deadline());
-  SetRoute(query, route);
+  SetMetadata(query, route, options_.security.token);
   const std::stop_callback cancel(stop, [&query] { query.TryCancel(); });
   v1::QueryUploadRequest request;
   request.set_sha256(sha256);
@@ -288,7 +294,11 @@ absl::StatusOr<Client> Client::Connect(const std::string& address, ClientOptions
   if (absl::Status status = CheckAddress(address); !status.ok()) {
     return status;
   }
-  return Client(std::make_unique<Impl>(address, std::move(options)));
+  const auto credentials = MakeCredentials(address, options.security);
+  if (!credentials.ok()) {
+    return credentials.status();
+  }
+  return Client(std::make_unique<Impl>(address, *credentials, std::move(options)));
 }
 
 bool Client::WaitForConnection(std::chrono::milliseconds time) {

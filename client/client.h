@@ -20,6 +20,20 @@
 
 namespace halflight::client {
 
+// How client and server know each other.
+struct Security {
+  // Whether to encrypt, and to believe only a server whose certificate is for the host of its
+  // address. Any of the files below means so too.
+  bool tls = false;
+  std::string ca_file{};    // the authorities to believe, PEM; empty: the system's
+  std::string cert_file{};  // what to show, PEM; with key_file
+  std::string key_file{};
+  // Who calls, where the server wants to know; empty: not said. It is kept out of every message.
+  std::string token{};
+  // Whether the token may also go in plain text to other machines.
+  bool insecure_token = false;
+};
+
 struct ClientOptions {
   // The longest that a call may take, retries included; of a sequence, the longest without a sign
   // of life. 0: for ever.
@@ -30,6 +44,7 @@ struct ClientOptions {
   std::chrono::milliseconds first_backoff{100};
   // When requested, calls end with CANCELLED at once.
   std::stop_token stop;
+  Security security;
 };
 
 // What uploads cost so far, payload bytes.
@@ -56,8 +71,8 @@ using FrameSink = std::function<absl::Status(uint64_t index, RenderedFrame frame
 // only after max_attempts.
 class Client {
  public:
-  // `address` is host:port or unix:path; InvalidArgument for anything else. Does not wait for the
-  // server: the first call does.
+  // `address` is host:port or unix:path; InvalidArgument for anything else, and for security that
+  // cannot be had as it is asked for. Does not wait for the server: the first call does.
   static absl::StatusOr<Client> Connect(const std::string& address, ClientOptions options = {});
   Client(const Client&) = delete;
   Client& operator=(const Client&) = delete;

@@ -23,7 +23,8 @@ std::optional<std::chrono::milliseconds> RetryHint(const grpc::ClientContext& co
 
 class Client::Impl {
  public:
-  Impl(const std::string& address, ClientOptions options);
+  Impl(const std::string& address, const std::shared_ptr<grpc::ChannelCredentials>& credentials,
+       ClientOptions options);
 
   bool WaitForConnection(std::chrono::milliseconds time, const std::stop_token& stop);
 
@@ -69,7 +70,8 @@ class Client::Impl {
   std::atomic<uint64_t> saved_bytes_ = 0;
 };
 
-// Adds the metadata that names the particle set; nothing for an empty route.
-void SetRoute(grpc::ClientContext& context, std::string_view route);
+// Adds the metadata that names the particle set, and the one that says who calls; nothing for an
+// empty route or token.
+void SetMetadata(grpc::ClientContext& context, std::string_view route, const std::string& token);
 
 }  // namespace halflight::client

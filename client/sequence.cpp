@@ -82,10 +82,10 @@ class SequenceCall {
   using SendFrame = std::function<absl::Status(uint64_t index, SequenceStream& stream,
                                                const std::stop_token&, bool& open)>;
 
-  SequenceCall(grpc::ChannelInterface& channel, std::string_view route, uint64_t first,
-               uint64_t count)
+  SequenceCall(grpc::ChannelInterface& channel, std::string_view route, const std::string& token,
+               uint64_t first, uint64_t count)
       : first_(first), count_(count), next_(first), progress_(first) {
-    SetRoute(context_, route);
+    SetMetadata(context_, route, token);
     stream_ = CallRenderSequence(channel, context_);
   }
 
@@ -252,7 +252,7 @@ absl::Status Client::Impl::RenderSequence(uint64_t count, const FrameSource& sou
   int tries = 1;
   Backoff backoff(options_.first_backoff);
   while (next < count) {
-    SequenceCall stream(*channel_, route, next, count);
+    SequenceCall stream(*channel_, route, options_.security.token, next, count);
     const auto [status, from_server] =
         stream.Run(send, sink, read_ahead, options_.timeout, options_.stop);
     if (options_.stop.stop_requested()) {

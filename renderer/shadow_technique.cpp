@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "absl/strings/str_cat.h"
+#include "renderer/field_error.h"
 #include "renderer/projection.h"
 #include "renderer/techniques/half_angle.h"
 #include "renderer/techniques/light_sweep.h"
@@ -62,14 +63,13 @@ bool ShowsOfLight(const FrameRequest& request, ImageKind kind, size_t light) {
 
 absl::Status CheckLightCount(const Scene& scene) {
   if (scene.lights.size() <= kMaxLights) return absl::OkStatus();
-  return absl::InvalidArgumentError(absl::StrCat("lighting.lights: ", scene.lights.size(),
-                                                 " lights, allowed: at most ", kMaxLights));
+  return FieldError("lighting.lights", absl::StrCat(scene.lights.size(), " lights"),
+                    absl::StrCat("at most ", kMaxLights));
 }
 
 absl::Status Refuse(const std::string& field, const std::string& value, const char* technique,
                     const std::string& allowed) {
-  return absl::InvalidArgumentError(
-      absl::StrCat(field, ": ", value, ", allowed under technique ", technique, ": ", allowed));
+  return FieldError(field, value, allowed, absl::StrCat(" under technique ", technique));
 }
 
 absl::Status CheckLightsOutside(const Scene& scene, const ParticleView& particles,

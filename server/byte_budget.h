@@ -34,10 +34,15 @@ class ByteBudget {
       return true;
     }
 
-    void Release() {
-      budget_.left_ += taken_;
-      taken_ = 0;
+    // Gives back what is beyond `bytes`.
+    void ShrinkTo(uint64_t bytes) {
+      if (bytes < taken_) {
+        budget_.left_ += taken_ - bytes;
+        taken_ = bytes;
+      }
     }
+
+    void Release() { ShrinkTo(0); }
 
    private:
     ByteBudget& budget_;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <iterator>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -29,6 +30,15 @@ std::string Key(std::string stage) {
   return stage;
 }
 
+void AppendCaller(std::string& line, const Caller& caller) {
+  for (const auto& [key, value] :
+       {std::pair("tenant", &caller.tenant), std::pair("peer", &caller.peer)}) {
+    if (!value->empty()) {
+      fmt::format_to(std::back_inserter(line), " {}={}", key, Quoted(*value));
+    }
+  }
+}
+
 void AppendOutcome(std::string& line, const absl::Status& outcome) {
   fmt::format_to(std::back_inserter(line), " outcome={}", absl::StatusCodeToString(outcome.code()));
   if (!outcome.ok()) {
@@ -40,11 +50,12 @@ void AppendOutcome(std::string& line, const absl::Status& outcome) {
 
 std::string FrameLogLine(const FrameJob& job, const MadeFrame& frame, const absl::Status& outcome) {
   const Scene& scene = job.request.scene;
-  std::string line = fmt::format(
-      "frame request_id={} technique={} particles={} size={}x{} outputs={}", Quoted(job.request_id),
-      v1::ShadowTechnique_Name(ToProto(kTechniques, scene.shadow.technique)),
-      scene.particles->size(), scene.camera.window.width, scene.camera.window.height,
-      job.outputs.size());
+  std::string line = fmt::format("frame request_id={}", Quoted(job.request_id));
+  AppendCaller(line, job.caller);
+  fmt::format_to(std::back_inserter(line), " technique={} particles={} size={}x{} outputs={}",
+                 v1::ShadowTechnique_Name(ToProto(kTechniques, scene.shadow.technique)),
+                 scene.particles->size(), scene.camera.window.width, scene.camera.window.height,
+                 job.outputs.size());
   for (const StageTiming& timing : frame.rendered.timings) {
     fmt::format_to(std::back_inserter(line), " {}_ms={:.2f}", Key(timing.stage),
                    timing.milliseconds);
@@ -61,8 +72,10 @@ std::string FrameLogLine(const FrameJob& job, const MadeFrame& frame, const absl
   return line;
 }
 
-std::string RefusalLogLine(const std::string& request_id, const absl::Status& outcome) {
+std::string RefusalLogLine(const std::string& request_id, const Caller& caller,
+                           const absl::Status& outcome) {
   std::string line = fmt::format("frame request_id={}", Quoted(request_id));
+  AppendCaller(line, caller);
   AppendOutcome(line, outcome);
   return line;
 }

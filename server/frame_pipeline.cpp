@@ -4,16 +4,14 @@
 #include <atomic>
 #include <chrono>
 #include <optional>
-#include <thread>
 #include <utility>
 
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
 #include "server/convert/describe.h"
-#include "server/convert/field_checks.h"
+#include "server/error_detail.h"
 #include "server/frame_log.h"
-#include "server/retry_hint.h"
 #include "server/status_text.h"
 
 namespace halflight {
@@ -21,12 +19,22 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-// How soon a frame that was accepted asks again, where the engine had no room for it. Short against
-// the time of a frame.
-constexpr auto kAskAgain = std::chrono::milliseconds(5);
-
 double Milliseconds(Clock::duration duration) {
   return std::chrono::duration<double, std::milli>(duration).count();
+}
+
+// What the engine has no memory for now, it may have when other frames have gone.
+absl::Status FromEngine(const absl::Status& status) {
+  return absl::IsResourceExhausted(status)
+             ? WithRetryHint(WithReason(status, v1::ERROR_REASON_DEVICE_MEMORY_FULL))
+             : status;
+}
+
+absl::Status TooLongError(std::chrono::milliseconds allowed) {
+  return WithReason(absl::DeadlineExceededError(
+                        fmt::format("the frame took longer than this server allows: at most {} s",
+                                    std::chrono::duration<double>(allowed).count())),
+                    v1::ERROR_REASON_FRAME_TIME_EXCEEDED);
 }
 
 double QueueMilliseconds(const FrameResult& result) {
@@ -39,13 +47,28 @@ double QueueMilliseconds(const FrameResult& result) {
 
 }  // namespace
 
+// A frame's part of the memory that frames may take.
+struct FramePipeline::Account {
+  explicit Account(std::shared_ptr<ByteBudget> of) : budget(std::move(of)), share(*budget) {}
+
+  const std::shared_ptr<ByteBudget> budget;
+  ByteBudget::Share share;
+};
+
 // Everything that flows between the stages of one frame. Each stage writes its own part; the last
 // output to be encoded sees all of it through `outputs_left`.
 struct FramePipeline::Flight {
   FrameJob job;
-  std::stop_token stop;
+  std::stop_source stop;
+  // Passes the client's wish on.
+  std::optional<std::stop_callback<std::function<void()>>> on_client_stop;
   Done done;
   Clock::time_point submitted;
+  std::shared_ptr<Account> account;
+
+  std::atomic<bool> rendering_begun = false;
+  std::optional<Timer::Ticket> time_limit;
+  std::atomic<bool> took_too_long = false;
 
   absl::Status outcome;  // of the stages before, or of the first output that failed, under `mutex`
   std::optional<FrameSearch> search;  // while it goes on
@@ -61,7 +84,11 @@ struct FramePipeline::Flight {
 };
 
 FramePipeline::FramePipeline(FrameEngine& engine, PipelineOptions options)
-    : engine_(engine), options_(std::move(options)), workers_(options_.encode_threads) {
+    : engine_(engine),
+      options_(std::move(options)),
+      frame_memory_(std::make_shared<ByteBudget>(options_.max_frame_bytes)),
+      workers_(options_.encode_threads),
+      queue_(engine, options_.frames_in_engine) {
   if (options_.warm_up) {
     workers_.Post([this] { WarmUp(); });
   }
@@ -81,29 +108,48 @@ void FramePipeline::WarmUp() {
   }
 }
 
-absl::Status FramePipeline::Admit() {
+absl::Status FramePipeline::Admit(const FrameJob& job, Flight& flight) {
+  flight.account = std::make_shared<Account>(frame_memory_);
   const std::lock_guard lock(mutex_);
   if (queued_ >= options_.max_queued_frames) {
-    return BusyError(fmt::format("the queue is full ({} frames): retry later", queued_));
+    return BusyError(v1::ERROR_REASON_QUEUE_FULL,
+                     fmt::format("the queue is full ({} frames): retry later", queued_));
+  }
+  const auto own = queued_of_.find(job.caller.client());
+  if (own != queued_of_.end() && own->second >= options_.max_client_frames) {
+    return BusyError(v1::ERROR_REASON_CLIENT_QUEUE_FULL,
+                     fmt::format("{} frames of this client are under way, allowed: at most {}: "
+                                 "retry later",
+                                 own->second, options_.max_client_frames));
+  }
+  if (!flight.account->share.Grow(job.pixel_bytes)) {
+    return BusyError(v1::ERROR_REASON_FRAME_MEMORY_FULL,
+                     fmt::format("the frame takes up to {} bytes, and of the {} for all frames {} "
+                                 "are left: retry later",
+                                 job.pixel_bytes, options_.max_frame_bytes, frame_memory_->left()));
   }
   ++queued_;
+  ++queued_of_[job.caller.client()];
   ++flights_;
   return absl::OkStatus();
 }
 
 absl::Status FramePipeline::Submit(FrameJob job, std::stop_token stop, Done done) {
-  if (absl::Status status = Admit(); !status.ok()) {
+  auto flight = std::make_shared<Flight>();
+  if (absl::Status status = Admit(job, *flight); !status.ok()) {
     return status;
   }
   if (job.request_id.empty()) {
     const std::lock_guard lock(mutex_);
     job.request_id = fmt::format("server-{}", next_id_++);
   }
-  auto flight = std::make_shared<Flight>();
   flight->job = std::move(job);
-  flight->stop = std::move(stop);
   flight->done = std::move(done);
   flight->submitted = Clock::now();
+  flight->on_client_stop.emplace(std::move(stop), [source = flight->stop] {
+    std::stop_source kept = source;  // the callback may go with the flight meanwhile
+    kept.request_stop();
+  });
   if (flight->job.target.has_value()) {
     // Whichever thread lets it begin has work of its own.
     flight->job.target->knowledge->Enter(
@@ -112,14 +158,13 @@ absl::Status FramePipeline::Submit(FrameJob job, std::stop_token stop, Done done
   }
   flight->measure = flight->job.measure;
   // The scene is needed again when the frame is described.
-  absl::Status status = Render(flight, flight->job.request, &FramePipeline::OnRendered);
-  if (!status.ok()) {
-    const std::lock_guard lock(mutex_);
-    --queued_;
-    --flights_;
-    idle_.notify_all();
-  }
-  return status;
+  Render(flight, flight->job.request, &FramePipeline::OnRendered);
+  return absl::OkStatus();
+}
+
+uint32_t FramePipeline::queued() const {
+  const std::lock_guard lock(mutex_);
+  return queued_;
 }
 
 void FramePipeline::BeginSearch(const FlightPtr& flight) {
@@ -151,47 +196,48 @@ void FramePipeline::NextPass(const FlightPtr& flight) {
   if (pass->settings.has_value()) {
     scene.shadow = pass->settings->shadow;
     scene.sampling = pass->settings->sampling;
-    RenderWhenThereIsRoom(flight, flight->job.request, &FramePipeline::OnRendered);
+    Render(flight, flight->job.request, &FramePipeline::OnRendered);
   } else {
     measurer_.Post([this, flight] { Measure(flight); });
   }
 }
 
-absl::Status FramePipeline::Render(const FlightPtr& flight, FrameRequest request, Stage next) {
+void FramePipeline::Render(const FlightPtr& flight, FrameRequest request, Stage next) {
   const size_t images = request.images.size();
-  const absl::Status status = engine_.Submit(
-      std::move(request), flight->stop,
-      // Only hand-overs from here: the engine's thread is for rendering.
-      [this, flight, images, next](absl::StatusOr<FrameResult> result) {
-        if (!result.ok()) {
-          Fail(flight, result.status());
-        } else if (result->images.size() != images) {
-          Fail(flight, absl::InternalError(fmt::format("the renderer made {} images of {}",
-                                                       result->images.size(), images)));
-        } else {
-          (this->*next)(flight, *std::move(result));
-        }
-      });
-  return absl::IsResourceExhausted(status) ? WithRetryHint(status) : status;
+  queue_.Push({.client = flight->job.caller.client(),
+               .priority = flight->job.priority,
+               .goes_on = flight->rendering_begun,
+               .request = std::move(request),
+               .stop = flight->stop.get_token(),
+               .begun = [this, flight] { OnBegun(flight); },
+               // Only hand-overs from here: the engine's thread is for rendering.
+               .done =
+                   [this, flight, images, next](absl::StatusOr<FrameResult> result) {
+                     if (!result.ok()) {
+                       Fail(flight, FromEngine(result.status()));
+                     } else if (result->images.size() != images) {
+                       Fail(flight,
+                            absl::InternalError(fmt::format("the renderer made {} images of {}",
+                                                            result->images.size(), images)));
+                     } else {
+                       (this->*next)(flight, *std::move(result));
+                     }
+                   }});
 }
 
-// For frames that were accepted: they are not lost because the queue is full when they come back.
-void FramePipeline::RenderWhenThereIsRoom(const FlightPtr& flight, FrameRequest request,
-                                          Stage next) {
-  const absl::Status status = Render(flight, request, next);
-  if (status.ok()) {
+// From the first rendering on the frame's time runs.
+void FramePipeline::OnBegun(const FlightPtr& flight) {
+  if (flight->rendering_begun.exchange(true) ||
+      options_.max_frame_time == std::chrono::milliseconds::max()) {
     return;
   }
-  if (!absl::IsResourceExhausted(status)) {
-    Fail(flight, status);
-  } else if (flight->stop.stop_requested()) {
-    Fail(flight, absl::CancelledError("the call was cancelled"));
-  } else {
-    waiter_.Post([this, flight, request = std::move(request), next] {
-      std::this_thread::sleep_for(kAskAgain);
-      RenderWhenThereIsRoom(flight, request, next);
-    });
-  }
+  flight->time_limit =
+      timer_.At(Clock::now() + options_.max_frame_time, [weak = std::weak_ptr(flight)] {
+        if (const FlightPtr late = weak.lock()) {
+          late->took_too_long = true;
+          late->stop.request_stop();
+        }
+      });
 }
 
 void FramePipeline::OnRendered(const FlightPtr& flight, FrameResult result) {
@@ -200,8 +246,7 @@ void FramePipeline::OnRendered(const FlightPtr& flight, FrameResult result) {
     OnMade(flight);
   } else if (flight->measure->without_scattering) {
     flight->compared_submitted = Clock::now();
-    RenderWhenThereIsRoom(flight, WithoutScattering(flight->job.request),
-                          &FramePipeline::OnRenderedToCompare);
+    Render(flight, WithoutScattering(flight->job.request), &FramePipeline::OnRenderedToCompare);
   } else {
     measurer_.Post([this, flight] { Measure(flight); });
   }
@@ -220,7 +265,7 @@ void FramePipeline::Measure(const FlightPtr& flight) {
   absl::StatusOr<FrameError> error = absl::CancelledError("the call was cancelled");
   if (!flight->stop.stop_requested()) {
     const Image& beauty = job.without_scattering ? *frame.other : frame.rendered.images[job.beauty];
-    error = options_.measure(beauty, flight->job.request.scene, job, flight->stop);
+    error = options_.measure(beauty, flight->job.request.scene, job, flight->stop.get_token());
   }
   if (!error.ok()) {
     Fail(flight, Prefixed("measuring the error: ", error.status()));
@@ -288,6 +333,13 @@ void FramePipeline::EncodeOutput(const FlightPtr& flight, size_t index) {
 
 void FramePipeline::Complete(const FlightPtr& flight) {
   flight->search.reset();  // others may wait for it
+  flight->on_client_stop.reset();
+  if (flight->time_limit.has_value()) {
+    timer_.Cancel(*flight->time_limit);
+  }
+  if (flight->took_too_long && absl::IsCancelled(flight->outcome)) {
+    flight->outcome = TooLongError(options_.max_frame_time);
+  }
   const auto now = Clock::now();
   if (!flight->outcome.ok()) {
     flight->frame = {};
@@ -304,9 +356,13 @@ void FramePipeline::Complete(const FlightPtr& flight) {
     auto frame = std::make_shared<EncodedFrame>();
     frame->header = DescribeFrame(flight->job, flight->frame, flight->encoded, engine_.device(),
                                   options_.server_version);
+    uint64_t bytes = 0;
     for (EncodedImage& encoded : flight->encoded) {
+      bytes += encoded.bytes.size();
       frame->outputs.push_back(std::move(encoded.bytes));
     }
+    flight->account->share.ShrinkTo(bytes);
+    frame->accounted = flight->account;
     answer = std::shared_ptr<const EncodedFrame>(std::move(frame));
   } else {
     answer = flight->outcome;
@@ -315,9 +371,14 @@ void FramePipeline::Complete(const FlightPtr& flight) {
   // the pixels where raw floats were asked for.
   flight->frame = {};
   flight->images.clear();
+  flight->account.reset();
   {
     const std::lock_guard lock(mutex_);
     --queued_;
+    const auto own = queued_of_.find(flight->job.caller.client());
+    if (--own->second == 0) {
+      queued_of_.erase(own);
+    }
   }
   std::exchange(flight->done, nullptr)(std::move(answer));
   const std::lock_guard lock(mutex_);

@@ -4,24 +4,30 @@
 // no clients.
 #pragma once
 
+#include <chrono>
 #include <condition_variable>
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <mutex>
 #include <stop_token>
 #include <string>
+#include <unordered_map>
 #include <vector>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "halflight/v1/frame.pb.h"
 #include "renderer/frame_engine.h"
+#include "server/byte_budget.h"
 #include "server/convert/convert_frame.h"
 #include "server/encode/encode.h"
 #include "server/frame_measurement.h"
+#include "server/frame_queue.h"
 #include "server/frame_search.h"
 #include "server/made_frame.h"
+#include "server/timer.h"
 #include "server/worker_pool.h"
 
 namespace halflight {
@@ -30,11 +36,18 @@ namespace halflight {
 // sending.
 struct EncodedFrame {
   v1::FrameHeader header;
-  std::vector<SharedBytes> outputs;  // in the request's order
+  std::vector<SharedBytes> outputs;       // in the request's order
+  std::shared_ptr<const void> accounted;  // of the memory that frames may take; given back with it
 };
 
 struct PipelineOptions {
   uint32_t max_queued_frames = 64;  // accepted and not yet encoded
+  uint32_t max_client_frames = 64;  // of these, of one client
+  // Of pixels, and once a frame is encoded of its files, until the frame is sent.
+  uint64_t max_frame_bytes = std::numeric_limits<uint64_t>::max();
+  // From when a frame's rendering begins until it is encoded.
+  std::chrono::milliseconds max_frame_time = std::chrono::milliseconds::max();
+  int frames_in_engine = 1;  // as FrameQueue's at_once
   int encode_threads = 1;
   // Whether to encode a small image of each kind of file at once, so that the first frame does not
   // wait for what the image library does the first time.
@@ -66,23 +79,29 @@ class FramePipeline {
   // Queues a frame; makes a request_id where the job has none. One with a target begins when its
   // knowledge lets it. When it returns OK, `done` is called
   // exactly once, on a thread of the pipeline, never of the engine: with the frame, with an error,
-  // or with Cancelled soon after `stop` was requested. Frames may be done in another order than
-  // they were submitted. Otherwise `done` is never called: ResourceExhausted with a retry hint when
-  // too many frames are under way, Unavailable when the engine is shutting down. Any thread.
+  // or with Cancelled soon after `stop` was requested; DeadlineExceeded where the frame took too
+  // long. Frames may be done in another order than they were submitted. Otherwise `done` is never
+  // called: ResourceExhausted with reason and retry hint when too many frames are under way, or of
+  // this client, or when they hold too much memory. Any thread.
   absl::Status Submit(FrameJob job, std::stop_token stop, Done done);
+
+  // Frames accepted and not yet encoded. Any thread.
+  [[nodiscard]] uint32_t queued() const;
 
  private:
   struct Flight;
   using FlightPtr = std::shared_ptr<Flight>;
   using Stage = void (FramePipeline::*)(const FlightPtr& flight, FrameResult result);
 
-  absl::Status Admit();
+  struct Account;
+
+  absl::Status Admit(const FrameJob& job, Flight& flight);
 
   // The stages in their order. Each hands the flight on, or over to Fail, and touches it no more.
   void BeginSearch(const FlightPtr& flight);
   void NextPass(const FlightPtr& flight);
-  absl::Status Render(const FlightPtr& flight, FrameRequest request, Stage next);
-  void RenderWhenThereIsRoom(const FlightPtr& flight, FrameRequest request, Stage next);
+  void Render(const FlightPtr& flight, FrameRequest request, Stage next);
+  void OnBegun(const FlightPtr& flight);
   void OnRendered(const FlightPtr& flight, FrameResult result);
   void OnRenderedToCompare(const FlightPtr& flight, FrameResult result);
   void Measure(const FlightPtr& flight);
@@ -97,19 +116,22 @@ class FramePipeline {
   FrameEngine& engine_;
   const PipelineOptions options_;
   CostModel costs_;  // of the engine's device
+  // Held by the frames too, which may outlive the pipeline.
+  const std::shared_ptr<ByteBudget> frame_memory_;
 
-  std::mutex mutex_;
+  mutable std::mutex mutex_;
   std::condition_variable idle_;
-  uint32_t queued_ = 0;   // counts against the limit
-  uint32_t flights_ = 0;  // until `done` has returned
+  uint32_t queued_ = 0;                                  // counts against the limit
+  std::unordered_map<std::string, uint32_t> queued_of_;  // by client; none at 0
+  uint32_t flights_ = 0;                                 // until `done` has returned
   uint64_t next_id_ = 0;
 
   WorkerPool workers_;
   // One: a measurement has all cores to itself, but for what renders and encodes meanwhile. Posts
   // to the workers, so it ends before them.
   WorkerPool measurer_{1};
-  // Waits for room in the engine's queue.
-  WorkerPool waiter_{1};
+  Timer timer_;
+  FrameQueue queue_;
 };
 
 }  // namespace halflight

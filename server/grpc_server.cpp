@@ -1,21 +1,19 @@
 #include "server/grpc_server.h"
 
+#include <algorithm>
 #include <chrono>
 #include <utility>
 
-#include <unistd.h>
-
-#include <fmt/format.h>
 #include <grpc/support/log.h>
 #include <grpcpp/ext/proto_server_reflection_plugin.h>
 #include <grpcpp/health_check_service_interface.h>
+#include <grpcpp/resource_quota.h>
 #include <grpcpp/server.h>
 #include <grpcpp/server_builder.h>
 #include <spdlog/spdlog.h>
 
+#include "server/listen/acceptor.h"
 #include "server/render_service.h"
-#include "server/status_text.h"
-#include "server/unix_socket.h"
 
 namespace halflight {
 namespace {
@@ -32,86 +30,99 @@ void ForwardLog(gpr_log_func_args* line) {
   }
 }
 
-std::string WithPort(const std::string& address, int port) {
-  return address.substr(0, address.rfind(':') + 1) + std::to_string(port);
+// Reflection is served by threads of gRPC's, one a stream: so many at once, and more are refused.
+constexpr int kMaxReflectionThreads = 16;
+
+int Milliseconds(uint32_t seconds) { return static_cast<int>(seconds) * 1000; }
+
+void SetChannelArguments(grpc::ServerBuilder& builder, const ServerLimits& limits) {
+  builder.SetMaxReceiveMessageSize(static_cast<int>(limits.max_message_bytes));
+  builder.AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS,
+                             static_cast<int>(limits.max_connection_streams));
+  builder.AddChannelArgument(GRPC_ARG_SERVER_HANDSHAKE_TIMEOUT_MS,
+                             Milliseconds(limits.max_handshake_seconds));
+  builder.AddChannelArgument(GRPC_ARG_MAX_CONNECTION_IDLE_MS,
+                             Milliseconds(limits.max_idle_seconds));
+  builder.SetResourceQuota(grpc::ResourceQuota("server").SetMaxThreads(kMaxReflectionThreads));
 }
 
 }  // namespace
 
 struct GrpcServer::Parts {
-  explicit Parts(const Backend& backend) : service(backend) {}
+  Parts(const Backend& backend, const Access& access) : service(backend, access) {}
 
   RenderService service;
   std::unique_ptr<grpc::Server> server;
+  std::unique_ptr<grpc::experimental::ExternalConnectionAcceptor> to_server;
+  std::unique_ptr<Acceptor> acceptor;
 };
 
 GrpcServer::GrpcServer(std::unique_ptr<Parts> parts) : parts_(std::move(parts)) {}
 
-absl::StatusOr<std::unique_ptr<GrpcServer>> GrpcServer::Start(
-    const std::vector<std::string>& addresses, const Backend& backend) {
+absl::StatusOr<std::unique_ptr<GrpcServer>> GrpcServer::Start(std::vector<ListeningSocket> sockets,
+                                                              const Access& access,
+                                                              const Backend& backend) {
   gpr_set_log_function(ForwardLog);
   grpc::EnableDefaultHealthCheckService(true);
   grpc::reflection::InitProtoReflectionServerBuilderPlugin();
 
-  auto parts = std::make_unique<Parts>(backend);
+  auto parts = std::make_unique<Parts>(backend, access);
   grpc::ServerBuilder builder;
   builder.RegisterService(&parts->service.grpc_service());
-  builder.SetMaxReceiveMessageSize(static_cast<int>(backend.limits.max_message_bytes));
-  // Otherwise a second server would share the port, and the calls.
-  builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
-  std::vector<int> ports(addresses.size(), 0);
-  for (size_t i = 0; i < addresses.size(); ++i) {
-    if (const std::string path = SocketPath(addresses[i]); !path.empty()) {
-      if (const absl::Status status = RemoveStaleSocket(path); !status.ok()) {
-        return Prefixed(fmt::format("--address {}: ", addresses[i]), status);
-      }
-    }
-    builder.AddListeningPort(addresses[i], grpc::InsecureServerCredentials(), &ports[i]);
-  }
+  SetChannelArguments(builder, backend.limits);
+  parts->to_server = builder.experimental().AddExternalConnectionAcceptor(
+      grpc::ServerBuilder::experimental_type::ExternalConnectionType::FROM_FD,
+      access.Credentials());
   parts->server = builder.BuildAndStart();
-  // A port that stayed 0 is where gRPC gave up.
-  for (size_t i = 0; i < addresses.size(); ++i) {
-    if (ports[i] == 0) {
-      return absl::UnavailableError(fmt::format(
-          "--address {}: cannot listen there: in use, not an address of this machine, or not "
-          "permitted",
-          addresses[i]));
-    }
-  }
   if (parts->server == nullptr) {
     return absl::InternalError("gRPC could not start its server");
   }
-
-  // The constructor is private.
+  // The constructor is private. From here on the destructor shuts down.
   std::unique_ptr<GrpcServer> started(new GrpcServer(std::move(parts)));
-  for (size_t i = 0; i < addresses.size(); ++i) {
-    started->addresses_.push_back(
-        SocketPath(addresses[i]).empty() ? WithPort(addresses[i], ports[i]) : addresses[i]);
+  for (const ListeningSocket& socket : sockets) {
+    // A name may stand for several places.
+    if (started->addresses_.empty() || started->addresses_.back() != socket.address()) {
+      started->addresses_.push_back(socket.address());
+    }
   }
+  auto acceptor = Acceptor::Start(
+      std::move(sockets), backend.limits.max_connections,
+      [to_server = started->parts_->to_server.get()](int fd) {
+        grpc::experimental::ExternalConnectionAcceptor::NewConnectionParameters connection;
+        connection.fd = fd;
+        to_server->HandleNewConnection(&connection);
+      });
+  if (!acceptor.ok()) {
+    return acceptor.status();
+  }
+  started->parts_->acceptor = *std::move(acceptor);
   return started;
 }
 
+absl::StatusOr<std::unique_ptr<GrpcServer>> GrpcServer::Start(
+    const std::vector<std::string>& addresses, const Backend& backend) {
+  static const Access everybody;
+  auto sockets = ListeningSocket::BindAll(addresses);
+  if (!sockets.ok()) {
+    return sockets.status();
+  }
+  return Start(*std::move(sockets), everybody, backend);
+}
+
 GrpcServer::~GrpcServer() {
+  parts_->acceptor.reset();
   parts_->server->Shutdown(std::chrono::system_clock::now() + kShutdownGrace);
   parts_->server->Wait();
-  RemoveSocketFiles();
 }
 
 void GrpcServer::BeginDrain() {
-  parts_->service.BeginDrain();
   parts_->server->GetHealthCheckService()->SetServingStatus(false);
+  parts_->service.BeginDrain();
+  parts_->acceptor->Stop();
 }
 
 bool GrpcServer::idle() const { return parts_->service.active_calls() == 0; }
 
 uint64_t GrpcServer::calls_begun() const { return parts_->service.calls_begun(); }
-
-void GrpcServer::RemoveSocketFiles() const {
-  for (const std::string& address : addresses_) {
-    if (const std::string path = SocketPath(address); !path.empty()) {
-      unlink(path.c_str());
-    }
-  }
-}
 
 }  // namespace halflight

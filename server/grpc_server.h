@@ -1,5 +1,5 @@
-// The gRPC server round the service: listens, serves health and reflection beside it, drains. Knows
-// nothing of what the calls do.
+// The gRPC server round the service: takes connections, serves health and reflection beside it,
+// drains. Knows nothing of what the calls do.
 #pragma once
 
 #include <cstdint>
@@ -8,14 +8,22 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
+#include "server/access/access.h"
 #include "server/handlers/backend.h"
+#include "server/listen/listening_socket.h"
 
 namespace halflight {
 
 class GrpcServer {
  public:
-  // Listens on every address ("host:port" or "unix:path"), or fails naming the one that it cannot.
-  // Block the signals that the process waits for before: the server's threads inherit the mask.
+  // Serves who connects to these sockets, or fails naming the one that cannot listen. Health and
+  // reflection answer everybody: they tell what load balancers and tools need before anybody could
+  // authenticate, and nothing that is not in the published protos. Block the signals that the
+  // process waits for before: the server's threads inherit the mask.
+  static absl::StatusOr<std::unique_ptr<GrpcServer>> Start(std::vector<ListeningSocket> sockets,
+                                                           const Access& access,
+                                                           const Backend& backend);
+  // The same with new sockets ("host:port" or "unix:path"), for everybody who can reach them.
   static absl::StatusOr<std::unique_ptr<GrpcServer>> Start(
       const std::vector<std::string>& addresses, const Backend& backend);
 
@@ -29,15 +37,13 @@ class GrpcServer {
   // The addresses with the ports that were taken for 0.
   [[nodiscard]] const std::vector<std::string>& addresses() const { return addresses_; }
 
-  // Health turns to NOT_SERVING and new calls are refused with UNAVAILABLE; calls under way go on.
+  // Health turns to NOT_SERVING, then nobody can connect any more and new calls are refused with
+  // UNAVAILABLE; calls under way go on. Socket files are removed.
   void BeginDrain();
   // Whether no call is under way.
   [[nodiscard]] bool idle() const;
   // Calls that ever began.
   [[nodiscard]] uint64_t calls_begun() const;
-
-  // For leaving without the destructor.
-  void RemoveSocketFiles() const;
 
  private:
   struct Parts;

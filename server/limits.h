@@ -24,12 +24,21 @@ struct ServerLimits {
   uint64_t max_output_bytes = 1 * kGiB;
   uint64_t max_message_bytes = 2 * kMiB;
   uint32_t max_queued_frames = 64;
+  uint32_t max_client_frames = 48;
+  uint64_t max_frame_bytes = 4 * kGiB;
+  uint32_t max_frame_seconds = 600;
+  uint32_t max_stall_seconds = 60;
+  uint32_t max_calls = 4096;
   // Samples times particles: about a minute on two cores where particles overlap a few hundred
   // deep.
   uint64_t max_reference_work = 400'000'000'000;
   uint32_t max_partial_uploads = 64;
   uint32_t partial_upload_seconds = 600;
   uint64_t max_cache_dir_bytes = 16 * kGiB;  // 0: there is no cache directory
+  uint32_t max_connections = 4096;
+  uint32_t max_connection_streams = 100;
+  uint32_t max_handshake_seconds = 10;
+  uint32_t max_idle_seconds = 3600;
 };
 
 inline constexpr uint32_t kMinLightBufferSize = 16;

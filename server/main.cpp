@@ -1,5 +1,6 @@
 // halflightd: flags, engine, service, wait, drain. What any of them does stands elsewhere.
 
+#include <algorithm>
 #include <chrono>
 #include <csignal>
 #include <cstdlib>
@@ -7,6 +8,7 @@
 #include <memory>
 #include <optional>
 #include <utility>
+#include <vector>
 
 #include <spdlog/sinks/stdout_sinks.h>
 #include <spdlog/spdlog.h>
@@ -14,9 +16,13 @@
 #include "renderer/block_cache.h"
 #include "renderer/kept_memory.h"
 #include "renderer/render_thread.h"
+#include "server/access/access.h"
 #include "server/grpc_server.h"
+#include "server/listen/acceptor.h"
+#include "server/listen/listening_socket.h"
 #include "server/options.h"
 #include "server/particle_files.h"
+#include "server/service_manager.h"
 #include "server/status_text.h"
 #include "server/version.h"
 
@@ -24,8 +30,9 @@ namespace {
 
 using namespace halflight;  // NOLINT(google-build-using-namespace): the whole program is of it
 
-constexpr int kExitBadFlags = 2;
+// docs/operations.md says what they mean.
 constexpr int kExitCannotStart = 1;
+constexpr int kExitBadFlags = 2;
 constexpr int kExitCutShort = 3;
 
 // How often a drain looks whether it is over.
@@ -83,7 +90,38 @@ int Fail(int code, const absl::Status& status) {
   return code;
 }
 
-int Run(const Options& options, const sigset_t& signals) {
+PipelineOptions PipelineOptionsOf(const Options& options, const ServerLimits& limits) {
+  PipelineOptions pipeline{.max_queued_frames = limits.max_queued_frames,
+                           .max_client_frames = limits.max_client_frames,
+                           .max_frame_bytes = limits.max_frame_bytes,
+                           .encode_threads = options.encode_threads,
+                           .warm_up = true,
+                           .server_version = kVersion};
+  if (limits.max_frame_seconds > 0) {
+    pipeline.max_frame_time = std::chrono::seconds(limits.max_frame_seconds);
+  }
+  return pipeline;
+}
+
+int Run(const Options& options, std::vector<ListeningSocket> inherited, const sigset_t& signals) {
+  // What can be wrong with flags and files shows before the device is started.
+  const auto access = Access::Load(options.access);
+  if (!access.ok()) {
+    return Fail(kExitCannotStart, access.status());
+  }
+  std::vector<std::string> addresses = options.addresses;
+  if (addresses.empty() && inherited.empty()) {
+    addresses.emplace_back(kDefaultAddress);
+  }
+  auto sockets = ListeningSocket::BindAll(addresses, std::move(inherited));
+  if (!sockets.ok()) {
+    return Fail(kExitCannotStart, sockets.status());
+  }
+  if (absl::Status status = CheckReach(*sockets, **access, options.access.insecure_listen);
+      !status.ok()) {
+    return Fail(kExitBadFlags, status);
+  }
+
   auto engine =
       StartRenderThread({.device = options.device,
                          .max_queued_frames = static_cast<int>(options.limits.max_queued_frames),
@@ -98,7 +136,12 @@ int Run(const Options& options, const sigset_t& signals) {
                device.gl_version, device.software);
 
   // Each uses those above it, and is gone before them.
-  const ServerLimits limits = LimitsOnDevice(options.limits, device);
+  ServerLimits limits = LimitsOnDevice(options.limits, device);
+  limits.max_connections = std::min(limits.max_connections, RoomForConnections());
+  if (limits.max_connections < options.limits.max_connections) {
+    spdlog::warn("fewer connections than --max-connections, for want of open files max={}",
+                 limits.max_connections);
+  }
   const std::string version = kVersion;
   std::unique_ptr<ParticleFiles> files;
   if (!options.cache_dir.empty()) {
@@ -113,11 +156,8 @@ int Run(const Options& options, const sigset_t& signals) {
   PartialUploads partial_uploads(upload_memory,
                                  {.max_count = limits.max_partial_uploads,
                                   .max_age = std::chrono::seconds(limits.partial_upload_seconds)});
-  FramePipeline pipeline(**engine, {.max_queued_frames = limits.max_queued_frames,
-                                    .encode_threads = options.encode_threads,
-                                    .warm_up = true,
-                                    .server_version = version});
-  auto server = GrpcServer::Start(options.addresses,
+  FramePipeline pipeline(**engine, PipelineOptionsOf(options, limits));
+  auto server = GrpcServer::Start(*std::move(sockets), **access,
                                   {device, limits, version, store, partial_uploads, pipeline});
   if (!server.ok()) {
     return Fail(kExitCannotStart, server.status());
@@ -125,12 +165,13 @@ int Run(const Options& options, const sigset_t& signals) {
   for (const std::string& address : (*server)->addresses()) {
     spdlog::info("listening address={}", address);
   }
+  NotifyServiceManager("READY=1");
 
   const int signal = WaitForSignal(**server, partial_uploads, signals);
   spdlog::info("draining signal={} drain_seconds={}", signal, options.drain_seconds);
+  NotifyServiceManager("STOPPING=1");
   if (!Drain(**server, store, signals, options.drain_seconds)) {
     // At once: what runs may be stuck, so nothing is waited for.
-    (*server)->RemoveSocketFiles();
     spdlog::error("stopped before the calls under way were finished");
     std::_Exit(kExitCutShort);
   }
@@ -151,11 +192,15 @@ int main(int argc, char** argv) {
   KeepFreedMemory();
   // A file that may not grow is an error of the write, not the end of the server.
   signal(SIGXFSZ, SIG_IGN);
+  auto inherited = TakeInheritedSockets();
+  if (!inherited.ok()) {
+    return Fail(kExitCannotStart, inherited.status());
+  }
   // Before any thread is made: all of them inherit the mask.
   const sigset_t signals = BlockTerminationSignals();
   spdlog::set_default_logger(spdlog::stderr_logger_mt("halflightd"));
   spdlog::set_level(spdlog::level::from_str((*options)->log_level));
   spdlog::set_pattern("%Y-%m-%dT%H:%M:%S.%e%z level=%l %v");
   spdlog::flush_on(spdlog::level::info);
-  return Run(**options, signals);
+  return Run(**options, *std::move(inherited), signals);
 }

@@ -27,9 +27,10 @@ constexpr size_t kMaxSocketPath = sizeof(sockaddr_un::sun_path) - 1;
 
 void AddFlags(CLI::App& app, Options& options) {
   app.add_option("--address", options.addresses,
-                 "Where to listen, host:port or unix:path; may be given several times. Port 0 "
-                 "takes a free one, which is logged")
-      ->capture_default_str()
+                 fmt::format("Where to listen, host:port or unix:path; may be given several times. "
+                             "Port 0 takes a free one, which is logged. Default: {}, or what "
+                             "systemd hands over",
+                             kDefaultAddress))
       ->type_name("ADDRESS");
   app.add_option("--device", options.device,
                  "What to render on: auto, software, uuid:<32 hex digits>, cuda:<index> or "
@@ -42,7 +43,29 @@ void AddFlags(CLI::App& app, Options& options) {
   app.add_option("--drain-seconds", options.drain_seconds,
                  "How long what runs may go on after SIGTERM")
       ->capture_default_str();
+}
 
+void AddAccessFlags(CLI::App& app, AccessOptions& access) {
+  const auto file = [&app](const std::string& flag, std::string& path, const std::string& help) {
+    app.add_option(flag, path, help)->type_name("FILE")->group("Access");
+  };
+  file("--tls-cert", access.tls.certificate,
+       "Certificate chain in PEM: connections are encrypted. Files of this group are read again "
+       "when they change");
+  file("--tls-key", access.tls.key, "Its private key in PEM");
+  file("--tls-client-ca", access.tls.client_authorities,
+       "Authorities in PEM whose client certificates say who calls; calls without one, or a token, "
+       "are refused");
+  file("--token-file", access.token_file,
+       "Bearer tokens that say who calls, lines '<SHA-256 of the token in hex> <tenant>'; calls "
+       "without one, or a client certificate, are refused");
+  app.add_flag("--insecure-listen", access.insecure_listen,
+               "Listen also where others than this machine can connect although calls are not "
+               "encrypted, or not authenticated")
+      ->group("Access");
+}
+
+void AddLimitFlags(CLI::App& app, Options& options) {
   CLI::Option* const cache_dir =
       app.add_option("--cache-dir", options.cache_dir,
                      "Directory in which particle sets outlast the server; made where it is "
@@ -95,7 +118,23 @@ void AddFlags(CLI::App& app, Options& options) {
          "REFERENCE, and to measure errors");
   number("--max-queued-frames", limits.max_queued_frames,
          "Frames waiting, rendering or encoding, of all clients together");
+  number("--max-client-frames", limits.max_client_frames, "Of these, frames of one client");
+  bytes("--max-frame-bytes", limits.max_frame_bytes,
+        "Pixels and files of all frames from when they are accepted until they are sent");
+  number("--max-frame-seconds", limits.max_frame_seconds,
+         "How long a frame may take once its rendering has begun; 0: no limit");
+  number("--max-stall-seconds", limits.max_stall_seconds,
+         "How long a client may leave unread what is sent to it, or an upload unsent, before its "
+         "call is ended; 0: for ever");
+  number("--max-calls", limits.max_calls, "Calls under way");
   bytes("--max-message-bytes", limits.max_message_bytes, "Largest message received");
+  number("--max-connections", limits.max_connections,
+         "Connections of all clients together; fewer where the limit on open files wants it");
+  number("--max-connection-streams", limits.max_connection_streams, "Calls of one connection");
+  number("--max-handshake-seconds", limits.max_handshake_seconds,
+         "From connecting until TLS and HTTP/2 are set up");
+  number("--max-idle-seconds", limits.max_idle_seconds,
+         "Of a connection without a call, before it is closed");
 }
 
 void CheckAddress(const std::string& address, FieldChecks& checks) {
@@ -116,15 +155,30 @@ void CheckAddress(const std::string& address, FieldChecks& checks) {
   }
 }
 
-absl::Status Check(const Options& options) {
-  FieldChecks checks;
-  for (const std::string& address : options.addresses) {
+void CheckAddresses(const std::vector<std::string>& addresses, FieldChecks& checks) {
+  for (const std::string& address : addresses) {
     CheckAddress(address, checks);
     const bool fixed = address.size() < 2 || address.compare(address.size() - 2, 2, ":0") != 0;
-    if (fixed && std::count(options.addresses.begin(), options.addresses.end(), address) > 1) {
+    if (fixed && std::count(addresses.begin(), addresses.end(), address) > 1) {
       checks.Reject("--address", address + " twice", "each address once");
     }
   }
+}
+
+void CheckTls(const TlsPaths& tls, FieldChecks& checks) {
+  if (tls.key.empty() != tls.certificate.empty()) {
+    checks.Reject(tls.key.empty() ? "--tls-key" : "--tls-cert", "\"\"",
+                  "certificate and key together");
+  }
+  if (tls.certificate.empty() && !tls.client_authorities.empty()) {
+    checks.Reject("--tls-client-ca", tls.client_authorities, "with --tls-cert and --tls-key");
+  }
+}
+
+absl::Status Check(const Options& options) {
+  FieldChecks checks;
+  CheckAddresses(options.addresses, checks);
+  CheckTls(options.access.tls, checks);
   const std::vector<std::string> levels = {"trace", "debug", "info", "warn", "error", "off"};
   if (std::find(levels.begin(), levels.end(), options.log_level) == levels.end()) {
     checks.Reject("--log-level", options.log_level, kLogLevels);
@@ -144,10 +198,24 @@ absl::Status Check(const Options& options) {
   checks.InRange("--max-outputs", limits.max_outputs, {.low = 1.0, .high = 1024.0});
   checks.InRange("--max-output-bytes", limits.max_output_bytes, {.low = 1.0});
   checks.InRange("--max-queued-frames", limits.max_queued_frames, {.low = 1.0, .high = 65536.0});
+  checks.InRange("--max-client-frames", limits.max_client_frames, {.low = 1.0, .high = 65536.0});
+  checks.InRange("--max-frame-seconds", limits.max_frame_seconds, {.low = 0.0, .high = 86400.0});
+  checks.InRange("--max-stall-seconds", limits.max_stall_seconds, {.low = 0.0, .high = 86400.0});
+  checks.InRange("--max-calls", limits.max_calls, {.low = 1.0, .high = 1e6});
+  if (limits.max_frame_bytes < limits.max_output_bytes) {
+    checks.Reject("--max-frame-bytes", fmt::format("{}", limits.max_frame_bytes),
+                  fmt::format("at least --max-output-bytes, {}", limits.max_output_bytes));
+  }
   // Room for a chunk of 64 KiB, the smallest that particles.proto recommends, and what is round it.
   checks.InRange("--max-reference-work", limits.max_reference_work, {.low = 0.0});
   checks.InRange("--max-message-bytes", limits.max_message_bytes,
                  {.low = 128.0 * 1024.0, .high = std::numeric_limits<int32_t>::max()});
+  checks.InRange("--max-connections", limits.max_connections, {.low = 1.0, .high = 1e6});
+  checks.InRange("--max-connection-streams", limits.max_connection_streams,
+                 {.low = 1.0, .high = 65536.0});
+  checks.InRange("--max-handshake-seconds", limits.max_handshake_seconds,
+                 {.low = 1.0, .high = 3600.0});
+  checks.InRange("--max-idle-seconds", limits.max_idle_seconds, {.low = 1.0, .high = 86400.0});
   checks.InRange("--max-particle-bytes", limits.max_particle_bytes, {.low = 1.0});
   if (limits.max_cache_bytes < limits.max_particle_bytes) {
     checks.Reject("--max-cache-bytes", fmt::format("{}", limits.max_cache_bytes),
@@ -164,6 +232,17 @@ absl::Status Check(const Options& options) {
   return checks.status();
 }
 
+// CLI11 does not say whether a wrong value stood in the file, so that both are named.
+std::string ParseMessage(const CLI::ParseError& error, const std::string& config_file) {
+  const std::string what = error.what();
+  const std::string unknown = "INI was not able to parse ";
+  if (what.rfind(unknown, 0) == 0) {
+    return fmt::format("{}: {}: is no flag, allowed: those that --help lists, without dashes",
+                       config_file, what.substr(unknown.size()));
+  }
+  return config_file.empty() ? what : fmt::format("{} (given, or in {})", what, config_file);
+}
+
 }  // namespace
 
 absl::StatusOr<std::optional<Options>> ParseOptions(int argc, const char* const* argv,
@@ -172,13 +251,20 @@ absl::StatusOr<std::optional<Options>> ParseOptions(int argc, const char* const*
   CLI::App app("halflightd: renders particle clouds for clients over gRPC", "halflightd");
   app.set_version_flag("--version", std::string("halflightd ") + kVersion);
   AddFlags(app, options);
+  AddAccessFlags(app, options.access);
+  AddLimitFlags(app, options);
+  const CLI::Option* const config =
+      app.set_config("--config", "",
+                     "Flags that are not given are taken from this file: lines "
+                     "'<flag> = <value>', the flag without its dashes");
+  app.allow_config_extras(CLI::config_extras_mode::error);
   try {
     app.parse(argc, argv);
   } catch (const CLI::Success& success) {
     app.exit(success, out, out);
     return std::nullopt;
   } catch (const CLI::ParseError& error) {
-    return absl::InvalidArgumentError(error.what());
+    return absl::InvalidArgumentError(ParseMessage(error, config->as<std::string>()));
   }
   if (absl::Status status = Check(options); !status.ok()) {
     return status;

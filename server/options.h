@@ -7,13 +7,19 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
+#include "server/access/access.h"
 #include "server/limits.h"
 
 namespace halflight {
 
+inline constexpr const char* kDefaultAddress = "127.0.0.1:50551";
+
 struct Options {
-  std::vector<std::string> addresses{"127.0.0.1:50551"};  // host:port or unix:path
-  std::string device = "auto";                            // as in RenderThreadOptions
+  // host:port or unix:path. None: kDefaultAddress, or only the sockets that a service manager hands
+  // over.
+  std::vector<std::string> addresses;
+  AccessOptions access;
+  std::string device = "auto";  // as in RenderThreadOptions
   ServerLimits limits;
   std::string log_level = "info";
   int encode_threads = 0;  // filled in: one for each core, less the one that renders
@@ -23,8 +29,9 @@ struct Options {
   int frames_in_flight = 0;             // as in FrameRendererOptions
 };
 
-// None when only --help or --version was asked for, and printed. InvalidArgument "<flag>: <value>,
-// allowed: <allowed>".
+// What a flag does not say is taken from the file that --config names: a line "<flag> = <value>"
+// each. None when only --help or --version was asked for, and printed. InvalidArgument "<flag>:
+// <value>, allowed: <allowed>", and of a line of the file that is wrong "<file>: <what>".
 absl::StatusOr<std::optional<Options>> ParseOptions(int argc, const char* const* argv,
                                                     std::ostream& out);
 

@@ -9,6 +9,7 @@
 
 #include "halflight/particle_payload.h"
 #include "server/convert/field_checks.h"
+#include "server/error_detail.h"
 
 namespace halflight {
 namespace {
@@ -82,13 +83,14 @@ absl::StatusOr<uint64_t> CheckedPayloadBytes(const v1::ParticleLayout& layout,
   }
   const std::optional<uint64_t> bytes = PayloadBytes(layout);
   if (layout.count() > limits.max_particles) {
-    return absl::InvalidArgumentError(fmt::format("{}.count: {}, allowed: at most {} particles",
-                                                  field, layout.count(), limits.max_particles));
+    return LimitError(field + ".count", fmt::format("{}", layout.count()),
+                      fmt::format("at most {} particles", limits.max_particles));
   }
   if (!bytes.has_value() || *bytes > limits.max_particle_bytes) {
-    return absl::InvalidArgumentError(
-        fmt::format("{}.count: {} particles of these attributes take {} bytes, allowed: at most {}",
-                    field, layout.count(), bytes.value_or(UINT64_MAX), limits.max_particle_bytes));
+    return LimitError(field + ".count",
+                      fmt::format("{} particles of these attributes take {} bytes", layout.count(),
+                                  bytes.value_or(UINT64_MAX)),
+                      fmt::format("at most {}", limits.max_particle_bytes));
   }
   return *bytes;
 }

@@ -70,10 +70,16 @@ absl::StatusOr<std::unique_ptr<ParticleFiles>> ParticleFiles::Open(const std::st
         "{}: {}: {}, allowed: a directory that the server may write, or whose parent it may", path,
         what, std::strerror(errno)));
   };
-  if (mkdir(path.c_str(), 0700) != 0 && errno != EEXIST) {
-    return error("cannot be made");
+  const auto open_directory = [&path] {
+    return FileDescriptor(open(path.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  };
+  FileDescriptor directory = open_directory();
+  if (!directory.ok() && errno == ENOENT) {
+    if (mkdir(path.c_str(), 0700) != 0 && errno != EEXIST) {
+      return error("cannot be made");
+    }
+    directory = open_directory();
   }
-  FileDescriptor directory(open(path.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
   if (!directory.ok()) {
     return error("cannot be opened");
   }

@@ -13,7 +13,7 @@ uint64_t MemoryBytes(const ParticleSet& set) {
          of(set.velocities) + of(set.emissions);
 }
 
-ParticleStore::ParticleStore(uint64_t max_bytes) : max_bytes_(max_bytes) {}
+ParticleStore::ParticleStore(uint64_t max_bytes) : ParticleStore(max_bytes, nullptr) {}
 
 ParticleStore::ParticleStore(uint64_t max_bytes, std::unique_ptr<ParticleFiles> files)
     : max_bytes_(max_bytes), files_(std::move(files)) {}

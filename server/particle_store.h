@@ -27,6 +27,7 @@ class ParticleStore {
   // Whatever their size: what a set takes beside its values is not counted.
   static constexpr size_t kMaxSets = 65536;
 
+  // In memory alone.
   explicit ParticleStore(uint64_t max_bytes);
   // `files`: the cache directory; null where there is none.
   ParticleStore(uint64_t max_bytes, std::unique_ptr<ParticleFiles> files);

@@ -7,7 +7,7 @@
 #include <fmt/format.h>
 
 #include "server/convert/field_checks.h"
-#include "server/retry_hint.h"
+#include "server/error_detail.h"
 #include "server/status_text.h"
 
 namespace halflight {
@@ -108,7 +108,8 @@ absl::Status ParticleUpload::Append(std::string_view bytes) {
   // An upload never holds more than the payload, whatever is sent: the assembler refuses the rest.
   if (assembler.received_bytes() + bytes.size() <= assembler.payload_bytes() &&
       !partial_.Grow(upload_->memory, bytes.size())) {
-    return BusyError("the memory for uploads in progress is used up: retry later");
+    return BusyError(v1::ERROR_REASON_UPLOAD_MEMORY_FULL,
+                     "the memory for uploads in progress is used up: retry later");
   }
   return assembler.Append(bytes);
 }
@@ -129,8 +130,10 @@ absl::Status ParticleUpload::Finish(const v1::UploadFinish& finish) {
   }
   NamedParticles particles = upload_->assembler.Finish();
   if (particles.sha256 != header.sha256()) {
-    return absl::DataLossError(fmt::format("header.sha256: {}, but what arrived has {}",
-                                           ToHex(header.sha256()), ToHex(particles.sha256)));
+    return WithReason(
+        absl::DataLossError(fmt::format("header.sha256: {}, but what arrived has {}",
+                                        ToHex(header.sha256()), ToHex(particles.sha256))),
+        v1::ERROR_REASON_CHECKSUM_MISMATCH);
   }
   partial_.Drop(particles.sha256);
   store_.Insert(particles.sha256, std::move(particles.set));
@@ -163,7 +166,7 @@ absl::StatusOr<NamedParticles> BuildInlineParticles(const v1::InlineParticles& p
   }
   ParticleAssembler assembler(particles.layout(), *bytes);
   if (const absl::Status status = assembler.Append(particles.payload()); !status.ok()) {
-    return Prefixed(path + ".", status);
+    return Within(path + ".", status);
   }
   return assembler.Finish();
 }

@@ -1,11 +1,16 @@
 #include "server/render_service.h"
 
 #include <atomic>
+#include <chrono>
 #include <optional>
 #include <utility>
 
+#include <fmt/format.h>
+
 #include "absl/status/status.h"
 #include "halflight/v1/service.grpc.pb.h"
+#include "server/caller.h"
+#include "server/error_detail.h"
 #include "server/handlers/find_missing_particles.h"
 #include "server/handlers/get_server_info.h"
 #include "server/handlers/query_upload.h"
@@ -13,6 +18,7 @@
 #include "server/handlers/render_sequence.h"
 #include "server/handlers/upload_particles.h"
 #include "server/message_buffer.h"
+#include "server/stall_guard.h"
 #include "server/status_to_grpc.h"
 
 // The callback API deletes a reactor in OnDone, which comes after Finish and after every reaction
@@ -32,13 +38,32 @@ struct CallCount {
   std::atomic<bool> draining = false;
 };
 
-// One call under way. Counted before draining is looked at, so that whoever drains and then sees no
-// calls can be sure that none slips in.
+// One call under way, and whose it is. Counted before draining is looked at, so that whoever drains
+// and then sees no calls can be sure that none slips in.
 class CallToken {
  public:
-  explicit CallToken(CallCount& count) : count_(count) {
-    ++count_.active;
+  CallToken(CallCount& count, const ServerLimits& limits, const Access& access,
+            const CallbackServerContext& context)
+      : count_(count) {
     ++count_.begun;
+    if (++count_.active > static_cast<int64_t>(limits.max_calls)) {
+      refusal_ = BusyError(v1::ERROR_REASON_TOO_MANY_CALLS,
+                           fmt::format("{} calls are under way, allowed: at most {}: retry later",
+                                       count_.active - 1, limits.max_calls));
+      return;
+    }
+    if (count_.draining) {
+      refusal_ = WithReason(
+          absl::UnavailableError("the server is shutting down: retry elsewhere or later"),
+          v1::ERROR_REASON_DRAINING);
+      return;
+    }
+    auto caller = access.Identify(context);
+    if (caller.ok()) {
+      caller_ = *std::move(caller);
+    } else {
+      refusal_ = WithReason(caller.status(), v1::ERROR_REASON_UNAUTHENTICATED);
+    }
   }
   ~CallToken() { --count_.active; }
   CallToken(const CallToken&) = delete;
@@ -46,29 +71,49 @@ class CallToken {
   CallToken(CallToken&&) = delete;
   CallToken& operator=(CallToken&&) = delete;
 
-  [[nodiscard]] bool refused() const { return count_.draining; }
+  // Why the call is not served, or OK.
+  [[nodiscard]] const absl::Status& refusal() const { return refusal_; }
+  // Nobody where it is refused.
+  [[nodiscard]] const Caller& caller() const { return caller_; }
 
  private:
   CallCount& count_;
+  absl::Status refusal_;
+  Caller caller_;
 };
 
-absl::Status DrainingError() {
-  return absl::UnavailableError("the server is shutting down: retry elsewhere or later");
+// What all calls of a service share.
+struct Shared {
+  Shared(const Backend& the_backend, const Access& the_access)
+      : backend(the_backend), access(the_access) {}
+
+  const Backend backend;
+  const Access& access;
+  CallCount count;
+  Timer timer;
+};
+
+std::chrono::seconds StallLimit(const Backend& backend) {
+  return std::chrono::seconds(backend.limits.max_stall_seconds);
 }
 
 class UploadCall final : public grpc::ServerReadReactor<v1::UploadParticlesRequest> {
  public:
-  UploadCall(const Backend& backend, CallCount& count, CallbackServerContext& context,
-             v1::UploadParticlesResponse& response)
-      : token_(count), context_(context), response_(response), handler_(backend) {
-    if (token_.refused()) {
-      Answer(DrainingError());
+  UploadCall(Shared& shared, CallbackServerContext& context, v1::UploadParticlesResponse& response)
+      : token_(shared.count, shared.backend.limits, shared.access, context),
+        context_(context),
+        response_(response),
+        handler_(shared.backend),
+        stall_(shared.timer, StallLimit(shared.backend), context) {
+    if (!token_.refusal().ok()) {
+      Answer(token_.refusal());
     } else {
-      StartRead(&request_);
+      Read();
     }
   }
 
   void OnReadDone(bool ok) override {
+    stall_.End();
     if (!ok) {
       Answer(handler_.OnEndOfRequests());
       return;
@@ -76,13 +121,18 @@ class UploadCall final : public grpc::ServerReadReactor<v1::UploadParticlesReque
     if (const auto answer = handler_.OnRequest(request_)) {
       Answer(*answer);
     } else {
-      StartRead(&request_);
+      Read();
     }
   }
 
   void OnDone() override { delete this; }
 
  private:
+  void Read() {
+    stall_.Begin();
+    StartRead(&request_);
+  }
+
   void Answer(const UploadParticlesHandler::Answer& answer) {
     if (answer.ok()) {
       response_ = *answer;
@@ -94,6 +144,7 @@ class UploadCall final : public grpc::ServerReadReactor<v1::UploadParticlesReque
   CallbackServerContext& context_;
   v1::UploadParticlesResponse& response_;
   UploadParticlesHandler handler_;
+  StallGuard stall_;
   v1::UploadParticlesRequest request_;
 };
 
@@ -108,13 +159,13 @@ class RenderFrameCall final : public grpc::ServerWriteReactor<grpc::ByteBuffer>,
   using Reactor = grpc::ServerWriteReactor<grpc::ByteBuffer>;
 
  public:
-  RenderFrameCall(const Backend& backend, CallCount& count, CallbackServerContext& context,
-                  const grpc::ByteBuffer& request)
-      : token_(count),
+  RenderFrameCall(Shared& shared, CallbackServerContext& context, const grpc::ByteBuffer& request)
+      : token_(shared.count, shared.backend.limits, shared.access, context),
         context_(context),
-        handler_(std::make_shared<RenderFrameHandler>(backend, *this)) {
-    if (v1::RenderFrameRequest message; token_.refused()) {
-      RenderFrameCall::Finish(DrainingError());
+        stall_(shared.timer, StallLimit(shared.backend), context),
+        handler_(std::make_shared<RenderFrameHandler>(shared.backend, *this, token_.caller())) {
+    if (v1::RenderFrameRequest message; !token_.refusal().ok()) {
+      RenderFrameCall::Finish(token_.refusal());
     } else if (!Parse(request, message)) {
       RenderFrameCall::Finish(
           absl::InvalidArgumentError("the message is not a RenderFrameRequest"));
@@ -123,19 +174,24 @@ class RenderFrameCall final : public grpc::ServerWriteReactor<grpc::ByteBuffer>,
     }
   }
 
-  void OnWriteDone(bool ok) override { handler_->OnWritten(ok); }
+  void OnWriteDone(bool ok) override {
+    stall_.End();
+    handler_->OnWritten(ok);
+  }
   void OnCancel() override { handler_->OnCancel(); }
   void OnDone() override { delete this; }
 
  private:
   void Write(const OutgoingMessage<v1::RenderFrameResponse>& outgoing) override {
     response_ = ToByteBuffer(outgoing);
+    stall_.Begin();
     StartWrite(&response_);
   }
   void Finish(const absl::Status& status) override { Reactor::Finish(ToGrpc(status, context_)); }
 
   const CallToken token_;
   CallbackServerContext& context_;
+  StallGuard stall_;
   const std::shared_ptr<RenderFrameHandler> handler_;
   grpc::ByteBuffer response_;
 };
@@ -145,12 +201,13 @@ class RenderSequenceCall final : public grpc::ServerBidiReactor<grpc::ByteBuffer
   using Reactor = grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer>;
 
  public:
-  RenderSequenceCall(const Backend& backend, CallCount& count, CallbackServerContext& context)
-      : token_(count),
+  RenderSequenceCall(Shared& shared, CallbackServerContext& context)
+      : token_(shared.count, shared.backend.limits, shared.access, context),
         context_(context),
-        handler_(std::make_shared<RenderSequenceHandler>(backend, *this)) {
-    if (token_.refused()) {
-      RenderSequenceCall::Finish(DrainingError());
+        stall_(shared.timer, StallLimit(shared.backend), context),
+        handler_(std::make_shared<RenderSequenceHandler>(shared.backend, *this, token_.caller())) {
+    if (!token_.refusal().ok()) {
+      RenderSequenceCall::Finish(token_.refusal());
     } else {
       handler_->Start();
     }
@@ -165,7 +222,10 @@ class RenderSequenceCall final : public grpc::ServerBidiReactor<grpc::ByteBuffer
       handler_->OnRequest(message);
     }
   }
-  void OnWriteDone(bool ok) override { handler_->OnWritten(ok); }
+  void OnWriteDone(bool ok) override {
+    stall_.End();
+    handler_->OnWritten(ok);
+  }
   void OnCancel() override { handler_->OnCancel(); }
   void OnDone() override { delete this; }
 
@@ -173,12 +233,14 @@ class RenderSequenceCall final : public grpc::ServerBidiReactor<grpc::ByteBuffer
   void Read() override { StartRead(&request_); }
   void Write(const OutgoingMessage<v1::RenderSequenceResponse>& outgoing) override {
     response_ = ToByteBuffer(outgoing);
+    stall_.Begin();
     StartWrite(&response_);
   }
   void Finish(const absl::Status& status) override { Reactor::Finish(ToGrpc(status, context_)); }
 
   const CallToken token_;
   CallbackServerContext& context_;
+  StallGuard stall_;
   const std::shared_ptr<RenderSequenceHandler> handler_;
   grpc::ByteBuffer request_;
   grpc::ByteBuffer response_;
@@ -194,15 +256,15 @@ using CallbackService = Rpcs::WithCallbackMethod_GetServerInfo<
 
 class RenderService::Calls final : public CallbackService {
  public:
-  explicit Calls(const Backend& backend) : backend_(backend) {}
+  Calls(const Backend& backend, const Access& access) : shared_(backend, access) {}
 
-  CallCount& count() { return count_; }
+  CallCount& count() { return shared_.count; }
 
   grpc::ServerUnaryReactor* GetServerInfo(CallbackServerContext* context,
                                           const v1::GetServerInfoRequest* /*request*/,
                                           v1::GetServerInfoResponse* response) override {
     return AnswerAtOnce(*context, *response, [&]() -> absl::StatusOr<v1::GetServerInfoResponse> {
-      return halflight::GetServerInfo(backend_);
+      return halflight::GetServerInfo(shared_.backend);
     });
   }
 
@@ -210,38 +272,38 @@ class RenderService::Calls final : public CallbackService {
       CallbackServerContext* context, const v1::FindMissingParticlesRequest* request,
       v1::FindMissingParticlesResponse* response) override {
     return AnswerAtOnce(*context, *response,
-                        [&] { return halflight::FindMissingParticles(backend_, *request); });
+                        [&] { return halflight::FindMissingParticles(shared_.backend, *request); });
   }
 
   grpc::ServerUnaryReactor* QueryUpload(CallbackServerContext* context,
                                         const v1::QueryUploadRequest* request,
                                         v1::QueryUploadResponse* response) override {
     return AnswerAtOnce(*context, *response,
-                        [&] { return halflight::QueryUpload(backend_, *request); });
+                        [&] { return halflight::QueryUpload(shared_.backend, *request); });
   }
 
   grpc::ServerReadReactor<v1::UploadParticlesRequest>* UploadParticles(
       CallbackServerContext* context, v1::UploadParticlesResponse* response) override {
-    return new UploadCall(backend_, count_, *context, *response);
+    return new UploadCall(shared_, *context, *response);
   }
 
   grpc::ServerWriteReactor<grpc::ByteBuffer>* RenderFrame(
       CallbackServerContext* context, const grpc::ByteBuffer* request) override {
-    return new RenderFrameCall(backend_, count_, *context, *request);
+    return new RenderFrameCall(shared_, *context, *request);
   }
 
   grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer>* RenderSequence(
       CallbackServerContext* context) override {
-    return new RenderSequenceCall(backend_, count_, *context);
+    return new RenderSequenceCall(shared_, *context);
   }
 
  private:
   template <typename Response, typename Handler>
   grpc::ServerUnaryReactor* AnswerAtOnce(CallbackServerContext& context, Response& response,
                                          const Handler& handler) {
-    const CallToken token(count_);
-    absl::Status status = DrainingError();
-    if (!token.refused()) {
+    const CallToken token(shared_.count, shared_.backend.limits, shared_.access, context);
+    absl::Status status = token.refusal();
+    if (status.ok()) {
       auto answer = handler();
       status = answer.status();
       if (answer.ok()) {
@@ -253,11 +315,11 @@ class RenderService::Calls final : public CallbackService {
     return reactor;
   }
 
-  const Backend backend_;
-  CallCount count_;
+  Shared shared_;
 };
 
-RenderService::RenderService(const Backend& backend) : calls_(std::make_unique<Calls>(backend)) {}
+RenderService::RenderService(const Backend& backend, const Access& access)
+    : calls_(std::make_unique<Calls>(backend, access)) {}
 
 RenderService::~RenderService() = default;
 

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <memory>
 
+#include "server/access/access.h"
 #include "server/handlers/backend.h"
 
 namespace grpc {
@@ -15,7 +16,8 @@ namespace halflight {
 
 class RenderService {
  public:
-  explicit RenderService(const Backend& backend);
+  // Both outlive the service. Calls of whom `access` does not know end with UNAUTHENTICATED.
+  RenderService(const Backend& backend, const Access& access);
   // After the gRPC server that it was registered with.
   ~RenderService();
   RenderService(const RenderService&) = delete;

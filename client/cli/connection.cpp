@@ -3,12 +3,27 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <cstdlib>
+#include <string>
 #include <utility>
 
 #include "client/cli/exit_code.h"
+#include "client/security.h"
 #include "client/status_text.h"
 
 namespace halflight::client {
+
+namespace {
+
+absl::StatusOr<std::string> Token(const ConnectionOptions& options) {
+  if (!options.token_file.empty()) {
+    return ReadTokenFile(options.token_file);
+  }
+  const char* const variable = std::getenv("HALFLIGHT_TOKEN");
+  return variable == nullptr ? "" : variable;
+}
+
+}  // namespace
 
 Connection::Connection(std::optional<LocalServer> server, Client client)
     : server_(std::move(server)), client_(std::move(client)) {}
@@ -19,6 +34,12 @@ absl::StatusOr<Connection> Connection::Open(const ConnectionOptions& options,
   client_options.timeout = std::chrono::milliseconds{std::llround(options.timeout_s * 1000)};
   client_options.stop = stop;
   if (!options.server.empty()) {
+    client_options.security = options.security;
+    auto token = Token(options);
+    if (!token.ok()) {
+      return WithExitCode(token.status(), ExitCode::kUsage);
+    }
+    client_options.security.token = *std::move(token);
     auto client = Client::Connect(options.server, client_options);
     if (!client.ok()) {
       return WithExitCode(

@@ -21,6 +21,21 @@ void AddConnectionFlags(CLI::App& app, ConnectionOptions& options) {
   app.add_option("--device", options.device, "Device of the halflightd that is started")
       ->type_name("DEVICE")
       ->excludes(server);
+  app.add_flag("--tls", options.security.tls,
+               "Encrypt, and believe servers whose certificate the system trusts")
+      ->needs(server);
+  const auto file = [&](const char* flag, std::string& path, const char* help) {
+    app.add_option(flag, path, help)->type_name("FILE")->needs(server);
+  };
+  file("--tls-ca", options.security.ca_file,
+       "Encrypt, and believe servers with a certificate of these authorities (PEM)");
+  file("--tls-cert", options.security.cert_file, "Show this client certificate (PEM)");
+  file("--tls-key", options.security.key_file, "Its private key (PEM)");
+  file("--token-file", options.token_file,
+       "Say who calls with the token in this file; default: with that in HALFLIGHT_TOKEN");
+  app.add_flag("--insecure-token", options.security.insecure_token,
+               "Send the token even where others can read it on the way")
+      ->needs(server);
   app.add_option_function<std::string>(
          "--timeout",
          [&options](const std::string& text) {

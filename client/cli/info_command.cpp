@@ -39,11 +39,14 @@ void Print(const v1::GetServerInfoResponse& info) {
       "limits: {} particles, {} bytes a set, {} bytes of sets\n"
       "        image side {}, light buffer {}, slices {}, lights {}, outputs {}\n"
       "        {} bytes of output, {} bytes a message, {} frames queued\n"
-      "        {} samples times particles of the reference\n",
+      "        {} samples times particles of the reference\n"
+      "        {} connections of {} calls each, {} s to connect, {} s without a call\n",
       limits.max_particles(), limits.max_particle_bytes(), limits.max_cache_bytes(),
       limits.max_image_size(), limits.max_light_buffer_size(), limits.max_slices(),
       limits.max_lights(), limits.max_outputs(), limits.max_output_bytes(),
-      limits.max_message_bytes(), limits.max_queued_frames(), limits.max_reference_work());
+      limits.max_message_bytes(), limits.max_queued_frames(), limits.max_reference_work(),
+      limits.max_connections(), limits.max_connection_streams(), limits.max_handshake_seconds(),
+      limits.max_idle_seconds());
 }
 
 }  // namespace

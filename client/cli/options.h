@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "client/client.h"
 #include "client/framing.h"
 #include "halflight/v1/frame.pb.h"
 #include "halflight/v1/scene.pb.h"
@@ -18,6 +19,9 @@ struct ConnectionOptions {
   std::string server;  // empty: start one
   std::string device;  // of the server that is started
   double timeout_s = 600;
+  // Of the server that is named.
+  Security security;
+  std::string token_file;  // empty: HALFLIGHT_TOKEN
 };
 
 struct OutputFlag {

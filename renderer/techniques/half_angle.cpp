@@ -6,6 +6,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "renderer/bands.h"
+#include "renderer/field_error.h"
 #include "renderer/frame_engine.h"
 #include "renderer/gl/debug.h"
 #include "renderer/gpu.h"
@@ -49,9 +50,9 @@ void DescribePasses(FramePlan& plan) {
 absl::Status CheckLightBuffers(const FramePlan& plan, const DeviceInfo& device) {
   for (const Traversal& traversal : plan.traversals) {
     if (traversal.light_buffer_size > device.max_texture_size) {
-      return absl::InvalidArgumentError(
-          absl::StrCat("shadow.light_buffer_size: ", traversal.light_buffer_size, ", allowed on ",
-                       device.gl_renderer, ": at most ", device.max_texture_size));
+      return FieldError("shadow.light_buffer_size", absl::StrCat(traversal.light_buffer_size),
+                        absl::StrCat("at most ", device.max_texture_size),
+                        " on " + device.gl_renderer);
     }
   }
   return absl::OkStatus();

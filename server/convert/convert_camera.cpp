@@ -123,7 +123,8 @@ Camera ConvertCamera(const v1::Camera& camera, int supersample, const ServerLimi
   }
   converted.projection = ConvertProjection(camera, checks);
 
-  const Interval sizes{.low = 1.0, .high = static_cast<double>(limits.max_image_size)};
+  const Interval sizes{
+      .low = 1.0, .high = static_cast<double>(limits.max_image_size), .server_limit = true};
   const uint32_t width =
       checks.InRangeOr("scene.camera.width", camera.width(), kDefaultWidth, sizes);
   const uint32_t height =
@@ -138,7 +139,8 @@ Camera ConvertCamera(const v1::Camera& camera, int supersample, const ServerLimi
     checks.Reject("scene.sampling.supersample",
                   fmt::format("{} with a window of {} x {} pixels", supersample,
                               converted.window.width, converted.window.height),
-                  fmt::format("at most {} samples along each side", limits.max_image_size));
+                  fmt::format("at most {} samples along each side", limits.max_image_size),
+                  /*server_limit=*/true);
   }
   return converted;
 }

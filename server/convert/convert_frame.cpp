@@ -9,6 +9,7 @@
 #include "renderer/shadow_technique.h"
 #include "server/convert/convert_scene.h"
 #include "server/convert/field_checks.h"
+#include "server/error_detail.h"
 #include "server/particle_upload.h"
 
 namespace halflight {
@@ -47,9 +48,11 @@ absl::StatusOr<NamedParticles> ResolveParticles(const v1::Scene& scene, Particle
       }
       auto set = store.Find(sha256);
       if (set == nullptr) {
-        return absl::NotFoundError(fmt::format(
-            "scene.particle_sha256: {} is not held by this server (any more): upload it first",
-            ToHex(sha256)));
+        return WithReason(
+            absl::NotFoundError(fmt::format("scene.particle_sha256: {} is not held by "
+                                            "this server (any more): upload it first",
+                                            ToHex(sha256))),
+            v1::ERROR_REASON_PARTICLES_NOT_FOUND);
       }
       return NamedParticles{sha256, std::move(set)};
     }
@@ -66,6 +69,7 @@ absl::StatusOr<FrameJob> ConvertFrame(const v1::RenderFrameRequest& request,
   CheckRequestId(request.request_id(), checks);
   FrameJob job;
   job.request_id = request.request_id();
+  job.priority = checks.InRange("priority", request.priority(), {.low = -100.0, .high = 100.0});
   job.particle_sha256 = particles.sha256;
   if (request.has_target()) {
     CheckTarget(request, checks);

@@ -10,6 +10,7 @@
 #include "halflight/v1/service.pb.h"
 #include "renderer/frame.h"
 #include "renderer/frame_engine.h"
+#include "server/caller.h"
 #include "server/convert/convert_measurement.h"
 #include "server/convert/convert_outputs.h"
 #include "server/convert/convert_target.h"
@@ -22,6 +23,8 @@ namespace halflight {
 // A frame to make.
 struct FrameJob {
   std::string request_id;
+  Caller caller;     // not of the request: filled in by who submits it
+  int priority = 0;  // among the frames of that client
   std::string particle_sha256;
   FrameRequest request;
   std::vector<OutputJob> outputs;

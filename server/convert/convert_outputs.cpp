@@ -116,8 +116,9 @@ bool IsSeenFromLight(ImageKind kind) {
 OutputPlan ConvertOutputs(const google::protobuf::RepeatedPtrField<v1::Output>& outputs,
                           const Scene& scene, const ServerLimits& limits, FieldChecks& checks) {
   OutputPlan plan;
-  checks.InRange("outputs", outputs.size(),
-                 {.low = 1.0, .high = static_cast<double>(limits.max_outputs)});
+  checks.InRange(
+      "outputs", outputs.size(),
+      {.low = 1.0, .high = static_cast<double>(limits.max_outputs), .server_limit = true});
   for (int i = 0; i < outputs.size() && checks.ok(); ++i) {
     OutputJob job = ConvertOutput(outputs[i], scene, fmt::format("outputs[{}]", i), checks);
     if (!checks.ok()) {
@@ -131,7 +132,7 @@ OutputPlan ConvertOutputs(const google::protobuf::RepeatedPtrField<v1::Output>& 
   plan.pixel_bytes = checks.ok() ? PixelBytes(plan.outputs, scene) : 0;
   if (plan.pixel_bytes > limits.max_output_bytes) {
     checks.Reject("outputs", fmt::format("{} bytes of pixels in 32-bit float", plan.pixel_bytes),
-                  fmt::format("at most {}", limits.max_output_bytes));
+                  fmt::format("at most {}", limits.max_output_bytes), /*server_limit=*/true);
   }
   return plan;
 }

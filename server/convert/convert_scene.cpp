@@ -128,19 +128,20 @@ ShadowSettings ConvertShadow(const v1::Shadow& shadow, const ServerLimits& limit
   converted.technique =
       FromProto(kTechniques, shadow.technique(), converted.technique, path + ".technique", checks);
   const auto default_slices = std::min<uint32_t>(converted.slices, limits.max_slices);
-  converted.slices = static_cast<int>(
-      checks.InRangeOr(path + ".slices", shadow.slices(), default_slices,
-                       {.low = 1.0, .high = static_cast<double>(limits.max_slices)}));
+  converted.slices = static_cast<int>(checks.InRangeOr(
+      path + ".slices", shadow.slices(), default_slices,
+      {.low = 1.0, .high = static_cast<double>(limits.max_slices), .server_limit = true}));
   converted.interpolate = !shadow.has_interpolate() || shadow.interpolate();
   converted.spacing =
       FromProto(kSpacings, shadow.spacing(), converted.spacing, path + ".spacing", checks);
   converted.compositor = FromProto(kCompositors, shadow.compositor(), converted.compositor,
                                    path + ".compositor", checks);
   converted.max_light_buffer_size = static_cast<int>(limits.max_light_buffer_size);
-  converted.light_buffer_size = static_cast<int>(
-      checks.InRangeOr(path + ".light_buffer_size", shadow.light_buffer_size(), 0U,
-                       {.low = static_cast<double>(kMinLightBufferSize),
-                        .high = static_cast<double>(limits.max_light_buffer_size)}));
+  converted.light_buffer_size =
+      static_cast<int>(checks.InRangeOr(path + ".light_buffer_size", shadow.light_buffer_size(), 0U,
+                                        {.low = static_cast<double>(kMinLightBufferSize),
+                                         .high = static_cast<double>(limits.max_light_buffer_size),
+                                         .server_limit = true}));
   if (shadow.has_fit_degree()) {
     converted.fit_degree =
         static_cast<int>(checks.InRange(path + ".fit_degree", shadow.fit_degree(),
@@ -215,7 +216,7 @@ Scene ConvertScene(const v1::Scene& scene, std::shared_ptr<const ParticleSet> pa
   const auto& lights = scene.lighting().lights();
   if (static_cast<uint32_t>(lights.size()) > limits.max_lights) {
     checks.Reject("scene.lighting.lights", fmt::format("{} lights", lights.size()),
-                  fmt::format("at most {}", limits.max_lights));
+                  fmt::format("at most {}", limits.max_lights), /*server_limit=*/true);
   }
   for (int i = 0; i < lights.size() && checks.ok(); ++i) {
     converted.lights.push_back(
@@ -266,7 +267,7 @@ void CheckReferenceWork(const std::string& field, const std::string& what, doubl
     checks.Reject(
         field,
         fmt::format("{} of {} samples times {} particles", what, work / particles, particles),
-        fmt::format("a product of at most {}", limits.max_reference_work));
+        fmt::format("a product of at most {}", limits.max_reference_work), /*server_limit=*/true);
   }
 }
 

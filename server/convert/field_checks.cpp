@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "server/error_detail.h"
+
 namespace halflight {
 
 std::string Interval::ToString() const {
@@ -14,15 +16,10 @@ std::string Interval::ToString() const {
   return "finite";
 }
 
-absl::Status FieldError(const std::string& field, const std::string& value,
-                        const std::string& allowed) {
-  return absl::InvalidArgumentError(fmt::format("{}: {}, allowed: {}", field, value, allowed));
-}
-
 void FieldChecks::Reject(const std::string& field, const std::string& value,
-                         const std::string& allowed) {
+                         const std::string& allowed, bool server_limit) {
   if (status_.ok()) {
-    status_ = FieldError(field, value, allowed);
+    status_ = server_limit ? LimitError(field, value, allowed) : FieldError(field, value, allowed);
   }
 }
 

@@ -11,6 +11,7 @@
 
 #include "absl/status/status.h"
 #include "halflight/particle_payload.h"
+#include "renderer/field_error.h"
 
 namespace halflight {
 
@@ -20,6 +21,7 @@ struct Interval {
   double high = std::numeric_limits<double>::infinity();
   bool open_low = false;
   bool open_high = false;
+  bool server_limit = false;  // `high` is one of ServerLimits: another server may allow more
 
   [[nodiscard]] bool Contains(double value) const {
     return std::isfinite(value) && (open_low ? value > low : value >= low) &&
@@ -36,19 +38,18 @@ inline constexpr Interval kNotNegative{.low = 0.0};
 inline constexpr Interval kOffset{.low = -kLargestLength, .high = kLargestLength};
 inline constexpr Interval kRadius{.low = kSmallestRadius, .high = kLargestLength};
 
-// InvalidArgument "<field>: <value>, allowed: <allowed>".
-absl::Status FieldError(const std::string& field, const std::string& value,
-                        const std::string& allowed);
-
 class FieldChecks {
  public:
   // `field` is the path in the request message, such as "scene.camera.width".
-  void Reject(const std::string& field, const std::string& value, const std::string& allowed);
+  // `server_limit`: the value is beyond one of ServerLimits.
+  void Reject(const std::string& field, const std::string& value, const std::string& allowed,
+              bool server_limit = false);
 
   template <typename T>
   T InRange(const std::string& field, T value, const Interval& allowed) {
     if (!allowed.Contains(static_cast<double>(value))) {
-      Reject(field, fmt::format("{}", value), allowed.ToString());
+      const bool beyond = allowed.server_limit && static_cast<double>(value) > allowed.high;
+      Reject(field, fmt::format("{}", value), allowed.ToString(), beyond);
     }
     return value;
   }

@@ -24,9 +24,18 @@ v1::GetServerInfoResponse GetServerInfo(const Backend& backend) {
   told.set_max_output_bytes(limits.max_output_bytes);
   told.set_max_message_bytes(limits.max_message_bytes);
   told.set_max_queued_frames(limits.max_queued_frames);
+  told.set_max_client_frames(limits.max_client_frames);
+  told.set_max_frame_bytes(limits.max_frame_bytes);
+  told.set_max_frame_seconds(limits.max_frame_seconds);
+  told.set_max_stall_seconds(limits.max_stall_seconds);
+  told.set_max_calls(limits.max_calls);
   told.set_max_partial_uploads(limits.max_partial_uploads);
   told.set_partial_upload_seconds(limits.partial_upload_seconds);
   told.set_max_cache_dir_bytes(limits.max_cache_dir_bytes);
+  told.set_max_connections(limits.max_connections);
+  told.set_max_connection_streams(limits.max_connection_streams);
+  told.set_max_handshake_seconds(limits.max_handshake_seconds);
+  told.set_max_idle_seconds(limits.max_idle_seconds);
 
   for (const auto& row : kTechniques) {
     response.add_techniques(row.proto);

@@ -24,7 +24,7 @@ void RenderFrameHandler::Begin(const v1::RenderFrameRequest& request) {
   const absl::Status status =
       stop_.stop_requested() ? absl::CancelledError("the call was cancelled") : Submit(request);
   if (!status.ok()) {
-    spdlog::info(RefusalLogLine(request.request_id(), status));
+    spdlog::info(RefusalLogLine(request.request_id(), caller_, status));
     sink_.Finish(status);
   }
 }
@@ -34,6 +34,7 @@ absl::Status RenderFrameHandler::Submit(const v1::RenderFrameRequest& request) {
   if (!job.ok()) {
     return job.status();
   }
+  job->caller = caller_;
   return backend_.pipeline.Submit(
       *std::move(job), stop_.get_token(),
       [self = shared_from_this()](const auto& frame) { self->OnFrame(frame); });

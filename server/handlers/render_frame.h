@@ -4,8 +4,11 @@
 #include <memory>
 #include <optional>
 #include <stop_token>
+#include <string>
+#include <utility>
 
 #include "halflight/v1/service.pb.h"
+#include "server/caller.h"
 #include "server/handlers/backend.h"
 #include "server/handlers/frame_messages.h"
 #include "server/handlers/sink.h"
@@ -16,8 +19,9 @@ namespace halflight {
 // frame is there: the sink has to live only until it is finished.
 class RenderFrameHandler : public std::enable_shared_from_this<RenderFrameHandler> {
  public:
-  RenderFrameHandler(const Backend& backend, ResponseSink<v1::RenderFrameResponse>& sink)
-      : backend_(backend), sink_(sink) {}
+  RenderFrameHandler(const Backend& backend, ResponseSink<v1::RenderFrameResponse>& sink,
+                     Caller caller = {})
+      : backend_(backend), sink_(sink), caller_(std::move(caller)) {}
 
   // Once, first.
   void Start(const v1::RenderFrameRequest& request);
@@ -36,6 +40,7 @@ class RenderFrameHandler : public std::enable_shared_from_this<RenderFrameHandle
 
   const Backend backend_;
   ResponseSink<v1::RenderFrameResponse>& sink_;
+  const Caller caller_;
   std::stop_source stop_;
   // From here on touched by one thread at a time: each step of the call starts the next.
   std::optional<FrameMessages> messages_;

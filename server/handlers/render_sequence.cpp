@@ -1,7 +1,5 @@
 #include "server/handlers/render_sequence.h"
 
-#include <algorithm>
-#include <iterator>
 #include <string>
 #include <utility>
 
@@ -42,7 +40,9 @@ void RenderSequenceHandler::Take(absl::StatusOr<FrameJob> job, const std::string
     slots_.push_back(std::make_shared<Slot>());
     slots_.back()->index = next_index_++;
     if (job.ok()) {
+      job->caller = caller_;
       waiting_ = *std::move(job);
+      waiting_->caller = caller_;
       may_submit_ = true;
     } else {
       Refuse(*slots_.back(), request_id, job.status());
@@ -54,15 +54,9 @@ void RenderSequenceHandler::Take(absl::StatusOr<FrameJob> job, const std::string
 // Under the mutex. The stream ends with this frame.
 void RenderSequenceHandler::Refuse(Slot& slot, const std::string& request_id,
                                    const absl::Status& status) {
-  spdlog::info(RefusalLogLine(request_id, status));
+  spdlog::info(RefusalLogLine(request_id, caller_, status));
   slot.result = status;
   requests_ended_ = true;
-}
-
-// Under the mutex.
-bool RenderSequenceHandler::HasFramesUnderWay() const {
-  return std::any_of(slots_.begin(), std::prev(slots_.end()),
-                     [](const auto& slot) { return !slot->result.has_value(); });
 }
 
 // By the thread that advances: hands the frame that waits to the pipeline.
@@ -76,8 +70,8 @@ void RenderSequenceHandler::Submit() {
         self->OnFrame(*slot, std::move(frame));
       });
   lock.lock();
-  // With frames of its own in the queue, or just out of it, the stream tries again.
-  if (absl::IsResourceExhausted(status) && (HasFramesUnderWay() || may_submit_)) {
+  // With frames of its own before it, or just sent, the stream tries again.
+  if (absl::IsResourceExhausted(status) && (slots_.size() > 1 || may_submit_)) {
     return;
   }
   if (!status.ok()) {
@@ -184,6 +178,7 @@ RenderSequenceHandler::Step RenderSequenceHandler::NextStep() {
       }
       messages_.reset();
       slots_.pop_front();
+      may_submit_ = true;
       return NextStep();
     }
   }

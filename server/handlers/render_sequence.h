@@ -10,8 +10,10 @@
 #include <optional>
 #include <stop_token>
 #include <string>
+#include <utility>
 
 #include "halflight/v1/service.pb.h"
+#include "server/caller.h"
 #include "server/handlers/backend.h"
 #include "server/handlers/frame_messages.h"
 #include "server/handlers/sequence_state.h"
@@ -30,11 +32,13 @@ inline constexpr size_t kFramesAhead = 4;
 // and calls Advance, which lets one thread at a time do what follows, without the mutex: so the
 // sink is never called by two at once, and never after Finish.
 //
-// A stream never fails because its own frames fill the queue: the next one then waits for them.
+// A stream never fails because its own frames fill the queue, or the memory for frames: the next
+// one then waits until they are sent.
 class RenderSequenceHandler : public std::enable_shared_from_this<RenderSequenceHandler> {
  public:
-  RenderSequenceHandler(const Backend& backend, DuplexSink<v1::RenderSequenceResponse>& sink)
-      : backend_(backend), sink_(sink) {}
+  RenderSequenceHandler(const Backend& backend, DuplexSink<v1::RenderSequenceResponse>& sink,
+                        Caller caller = {})
+      : backend_(backend), sink_(sink), caller_(std::move(caller)) {}
 
   // Once, first.
   void Start() { Advance(); }
@@ -62,7 +66,6 @@ class RenderSequenceHandler : public std::enable_shared_from_this<RenderSequence
   void Take(absl::StatusOr<FrameJob> job, const std::string& request_id);
   void Refuse(Slot& slot, const std::string& request_id, const absl::Status& status);
   void Submit();
-  [[nodiscard]] bool HasFramesUnderWay() const;
   void OnFrame(Slot& slot, FrameOrError result);
   void End(const absl::Status& status);
   void Advance();
@@ -70,6 +73,7 @@ class RenderSequenceHandler : public std::enable_shared_from_this<RenderSequence
 
   const Backend backend_;
   DuplexSink<v1::RenderSequenceResponse>& sink_;
+  const Caller caller_;
   std::stop_source stop_;
 
   // Touched only by the thread that completes a read; reads are one at a time.

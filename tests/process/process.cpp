@@ -4,8 +4,10 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <array>
 #include <atomic>
 #include <csignal>
+#include <cstdio>
 #include <cstdlib>
 #include <fstream>
 #include <sstream>
@@ -35,7 +37,7 @@ std::string Folder::Write(const std::string& name, const std::string& bytes) con
 }
 
 Process::Process(const Folder& folder, const std::string& program,
-                 std::vector<std::string> arguments) {
+                 std::vector<std::string> arguments, ProcessOptions options) {
   static std::atomic<int> logs = 0;
   log_ = folder / ("log." + std::to_string(logs++));
   arguments.insert(arguments.begin(), std::string(HALFLIGHT_BINARY_DIR) + "/" + program);
@@ -45,8 +47,19 @@ Process::Process(const Folder& folder, const std::string& program,
     argv.push_back(argument.data());
   }
   argv.push_back(nullptr);
-  std::string tmpdir = "TMPDIR=" + folder / "tmp";
-  std::vector<char*> environment = {tmpdir.data(), nullptr};
+  options.environment.push_back("TMPDIR=" + folder / "tmp");
+  std::array<char, 32> listen_pid{};
+  if (!options.sockets.empty()) {
+    options.environment.push_back("LISTEN_FDS=" + std::to_string(options.sockets.size()));
+  }
+  std::vector<char*> environment;
+  for (std::string& variable : options.environment) {
+    environment.push_back(variable.data());
+  }
+  if (!options.sockets.empty()) {
+    environment.push_back(listen_pid.data());
+  }
+  environment.push_back(nullptr);
   const std::string out = log_ + ".out";
   const std::string err = log_ + ".err";
   pid_ = fork();
@@ -54,6 +67,10 @@ Process::Process(const Folder& folder, const std::string& program,
     constexpr int kFlags = O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC;
     dup2(open(out.c_str(), kFlags, 0600), STDOUT_FILENO);
     dup2(open(err.c_str(), kFlags, 0600), STDERR_FILENO);
+    for (size_t i = 0; i < options.sockets.size(); ++i) {
+      dup2(options.sockets[i], static_cast<int>(3 + i));
+    }
+    std::snprintf(listen_pid.data(), listen_pid.size(), "LISTEN_PID=%d", getpid());
     execve(argv[0], argv.data(), environment.data());
     _exit(127);
   }
@@ -97,8 +114,9 @@ std::string Process::Address() const {
   return address;
 }
 
-Ended RunHalflight(const Folder& folder, const std::vector<std::string>& arguments) {
-  Process process(folder, "halflight", arguments);
+Ended RunHalflight(const Folder& folder, const std::vector<std::string>& arguments,
+                   const ProcessOptions& options) {
+  Process process(folder, "halflight", arguments, options);
   const int code = process.Wait();
   return {code, process.Out(), process.Err()};
 }

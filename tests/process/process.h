@@ -26,16 +26,24 @@ class Folder {
   std::string path_;
 };
 
+struct ProcessOptions {
+  std::vector<std::string> environment{};  // "NAME=value", beside TMPDIR
+  // Handed over as a service manager does: descriptors from 3 on, with LISTEN_FDS and LISTEN_PID.
+  std::vector<int> sockets{};
+};
+
 // One program that runs. Its TMPDIR is `folder`/tmp, and all that it prints is kept there too.
 class Process {
  public:
   // `program` is looked for where the build puts programs.
-  Process(const Folder& folder, const std::string& program, std::vector<std::string> arguments);
+  Process(const Folder& folder, const std::string& program, std::vector<std::string> arguments,
+          ProcessOptions options = {});
   // Ends it by force where it still runs.
   ~Process();
   Process(const Process&) = delete;
   Process& operator=(const Process&) = delete;
 
+  [[nodiscard]] pid_t pid() const { return pid_; }
   void Signal(int signal) const;
   // The exit code; -1 where it does not end within a minute, or of a signal.
   int Wait();
@@ -55,7 +63,8 @@ struct Ended {
   std::string out;
   std::string err;
 };
-Ended RunHalflight(const Folder& folder, const std::vector<std::string>& arguments);
+Ended RunHalflight(const Folder& folder, const std::vector<std::string>& arguments,
+                   const ProcessOptions& options = {});
 
 // Processes whose command line has `text` in it.
 int ProcessesWith(const std::string& text);

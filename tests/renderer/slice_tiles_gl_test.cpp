@@ -146,7 +146,7 @@ INSTANTIATE_TEST_SUITE_P(
 // no more than eight. Runs without blur: PlumeLit.
 TEST_F(SlicesInTiles, GoInRunsOfAsManySlicesAsLayersHold) {
   for (const bool interpolate : {false, true}) {
-    FrameRequest request = test::Beauty(test::BallScene(200, 64));
+    FrameRequest request = test::Beauty(test::BallScene(100, 32));
     Scene& scene = request.scene;
     scene.lights = {WithDensity(test::Sun({1, -1, interpolate ? 1 : -0.5}), {0.5F, 1.0F, 2.0F})};
     scene.shadow.slices = 9;

@@ -81,7 +81,8 @@ TEST_F(Measurement, ComparesTheBeautyAndTellsItInTheHeader) {
   EXPECT_EQ(error.sampled_pixels(), 1024U);
   EXPECT_EQ(error.relative_rmse().value(), direct->relative_rmse.value);
   EXPECT_GT(error.relative_rmse().low(), 0.0);
-  EXPECT_THAT(StagesOf(**result), ::testing::ElementsAre("composite", "error", "encode", "total"));
+  EXPECT_THAT(StagesOf(**result),
+              ::testing::ElementsAre("queue", "composite", "error", "encode", "total"));
   EXPECT_EQ((*result)->outputs.size(), 1U) << "the beauty was not asked for";
 }
 

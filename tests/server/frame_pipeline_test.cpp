@@ -9,8 +9,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "server/error_detail.h"
 #include "server/frame_log.h"
-#include "server/retry_hint.h"
 #include "tests/process/wait_for.h"
 #include "tests/server/pipeline_fixture.h"
 
@@ -46,9 +46,10 @@ TEST_F(Pipeline, FrameHoldsEveryOutputInOrder) {
   EXPECT_EQ(frame.header.metadata().server_version(), "1.2.3");
   EXPECT_EQ(frame.header.metadata().gl_renderer(), "fake");
   EXPECT_EQ(frame.header.plan().passes(0).name(), "pretend");
-  EXPECT_EQ(frame.header.timings(0).stage(), "composite");
-  EXPECT_EQ(frame.header.timings(1).stage(), "encode");
-  EXPECT_EQ(frame.header.timings(2).stage(), "total");
+  EXPECT_EQ(frame.header.timings(0).stage(), "queue");
+  EXPECT_EQ(frame.header.timings(1).stage(), "composite");
+  EXPECT_EQ(frame.header.timings(2).stage(), "encode");
+  EXPECT_EQ(frame.header.timings(3).stage(), "total");
 }
 
 TEST_F(Pipeline, MakesRequestIdsThatDiffer) {
@@ -110,7 +111,7 @@ TEST_F(Pipeline, RefusesWithAHintWhenFullAndTakesAgainAfterwards) {
   auto second = Submit(MustConvert());
   const Result third = Submit(MustConvert()).get();
   EXPECT_EQ(third.status().code(), absl::StatusCode::kResourceExhausted);
-  EXPECT_TRUE(RetryHint(third.status()).has_value());
+  EXPECT_TRUE(DetailOf(third.status()).retry_after.has_value());
   engine_.SetGate(true);
   EXPECT_TRUE(first.get().ok());
   EXPECT_TRUE(second.get().ok());
@@ -130,6 +131,85 @@ TEST_F(Pipeline, FramesThatWaitForTheEncoderCountAsQueued) {
   ASSERT_TRUE(WaitFor([&] { return engine_.rendered() == 1; }));
   EXPECT_EQ(Submit(MustConvert()).get().status().code(), absl::StatusCode::kResourceExhausted);
   release.set_value();
+  EXPECT_TRUE(first.get().ok());
+}
+
+TEST_F(Pipeline, ClientBeyondItsShareIsRefusedAndOthersAreNot) {
+  Start({.max_queued_frames = 4, .max_client_frames = 2, .encode = EncodePlain});
+  engine_.SetGate(false);
+  FrameJob job = MustConvert();
+  job.caller.tenant = "greedy";
+  auto first = Submit(job);
+  auto second = Submit(job);
+  const Result third = Submit(job).get();
+  EXPECT_EQ(third.status().code(), absl::StatusCode::kResourceExhausted);
+  EXPECT_EQ(DetailOf(third.status()).reason, v1::ERROR_REASON_CLIENT_QUEUE_FULL);
+  EXPECT_TRUE(DetailOf(third.status()).retry_after.has_value());
+  job.caller.tenant = "other";
+  auto other = Submit(job);
+  engine_.SetGate(true);
+  EXPECT_TRUE(first.get().ok());
+  EXPECT_TRUE(second.get().ok());
+  EXPECT_TRUE(other.get().ok());
+  job.caller.tenant = "greedy";
+  EXPECT_TRUE(Submit(job).get().ok());
+}
+
+TEST_F(Pipeline, MemoryOfAFrameIsHeldUntilItIsLetGo) {
+  const FrameJob job = MustConvert();
+  Start({.max_frame_bytes = job.pixel_bytes * 3 / 2, .encode = EncodePlain});
+  Result first = Submit(job).get();
+  ASSERT_TRUE(first.ok());
+  const Result refused = Submit(job).get();
+  EXPECT_EQ(DetailOf(refused.status()).reason, v1::ERROR_REASON_FRAME_MEMORY_FULL);
+  EXPECT_TRUE(DetailOf(refused.status()).retry_after.has_value());
+  *first = nullptr;
+  EXPECT_TRUE(Submit(job).get().ok());
+}
+
+TEST_F(Pipeline, EncodedFrameCountsWithItsBytesAlone) {
+  const FrameJob job = MustConvert();
+  Start({.max_frame_bytes = job.pixel_bytes * 3 / 2,
+         .encode = [](const SharedImage&, ImageKind, LightQuantity, const EncodeSettings&,
+                      const ImageMetadata&) -> absl::StatusOr<EncodedImage> {
+           return EncodedImage{.bytes = SharedBytes(std::string("small")),
+                               .media_type = "test/plain",
+                               .white_black = {}};
+         }});
+  const Result first = Submit(job).get();
+  ASSERT_TRUE(first.ok());
+  EXPECT_TRUE(Submit(job).get().ok());
+}
+
+TEST_F(Pipeline, FrameThatTakesTooLongIsEndedAndSaidSo) {
+  Start({.max_frame_time = std::chrono::milliseconds(20), .encode = EncodePlain});
+  engine_.SetGate(false);
+  const Result late = Submit(MustConvert()).get();
+  EXPECT_EQ(late.status().code(), absl::StatusCode::kDeadlineExceeded);
+  EXPECT_EQ(DetailOf(late.status()).reason, v1::ERROR_REASON_FRAME_TIME_EXCEEDED);
+  engine_.SetGate(true);
+  EXPECT_TRUE(Submit(MustConvert()).get().ok());
+}
+
+TEST_F(Pipeline, TimeInTheQueueDoesNotCountAgainstAFrame) {
+  Start({.max_frame_time = std::chrono::milliseconds(300), .encode = EncodePlain});
+  engine_.SetGate(false);
+  auto first = Submit(MustConvert());
+  auto second = Submit(MustConvert());
+  EXPECT_EQ(first.get().status().code(), absl::StatusCode::kDeadlineExceeded);
+  engine_.SetGate(true);
+  EXPECT_TRUE(second.get().ok());
+}
+
+TEST_F(Pipeline, CancelledInTheQueueDoesNotWaitForTheFrameBeforeIt) {
+  Start({.encode = EncodePlain});
+  engine_.SetGate(false);
+  auto first = Submit(MustConvert());
+  std::stop_source stop;
+  auto second = Submit(MustConvert(), stop.get_token());
+  stop.request_stop();
+  EXPECT_EQ(second.get().status().code(), absl::StatusCode::kCancelled);
+  engine_.SetGate(true);
   EXPECT_TRUE(first.get().ok());
 }
 
@@ -185,7 +265,7 @@ TEST_F(Pipeline, RefusalOfTheEngineLeavesRoomForTheNext) {
   engine_.RefuseWith(absl::ResourceExhaustedError("full"));
   const Result refused = Submit(MustConvert()).get();
   EXPECT_EQ(refused.status().code(), absl::StatusCode::kResourceExhausted);
-  EXPECT_TRUE(RetryHint(refused.status()).has_value());
+  EXPECT_TRUE(DetailOf(refused.status()).retry_after.has_value());
   engine_.RefuseWith(absl::OkStatus());
   EXPECT_TRUE(Submit(MustConvert()).get().ok());
 }

@@ -122,7 +122,8 @@ TEST_F(Search, GoesOnUntilTheErrorIsMeasuredToBeMet) {
   for (const v1::StageTiming& timing : header.timings()) {
     stages.push_back(timing.stage());
   }
-  EXPECT_THAT(stages, ::testing::ElementsAre("composite", "search", "error", "encode", "total"));
+  EXPECT_THAT(stages,
+              ::testing::ElementsAre("queue", "composite", "search", "error", "encode", "total"));
 }
 
 TEST_F(Search, MissIsSaidAndTheBestFrameReturned) {
@@ -316,33 +317,38 @@ TEST_F(Search, IsCancelledInItsMiddleAndLetsTheNextBegin) {
   EXPECT_TRUE(two.get().ok());
 }
 
-TEST_F(Search, EngineThatIsFullInItsMiddleDoesNotLoseTheFrame) {
+TEST_F(Search, GoesOnThoughTheQueueIsFull) {
   std::atomic<int> measured = 0;
-  Start({.encode = EncodePlain,
+  Start({.max_queued_frames = 1,
+         .encode = EncodePlain,
          .measure = [&](const Image&, const Scene&, const MeasureJob& job,
                         const std::stop_token&) -> absl::StatusOr<FrameError> {
            const bool first = measured++ == 0;
            if (first) {
-             engine_.RefuseWith(absl::ResourceExhaustedError("full"));
+             EXPECT_EQ(Submit(MustConvert()).get().status().code(),
+                       absl::StatusCode::kResourceExhausted);
            }
            return ErrorOf((first ? 1.3 : 0.5) * kGoal, job);
          }});
-  auto frame = Submit(MustConvert(TargetRequest()));
-  ASSERT_TRUE(WaitFor([&] { return engine_.refused() > 2; }));
-  engine_.RefuseWith(absl::OkStatus());
-  const Result result = frame.get();
+  const Result result = Submit(MustConvert(TargetRequest())).get();
   ASSERT_TRUE(result.ok()) << result.status();
   EXPECT_TRUE((*result)->header.target().met());
+  EXPECT_GE(engine_.rendered(), 2);
 }
 
-TEST_F(Search, IsCancelledWhileTheEngineIsFull) {
-  StartShowing({0.5 * kGoal});
-  engine_.RefuseWith(absl::ResourceExhaustedError("full"));
+TEST_F(Search, IsCancelledWhileItsNextPassWaits) {
   std::stop_source stop;
+  Start({.encode = EncodePlain,
+         .measure = [&](const Image&, const Scene&, const MeasureJob& job,
+                        const std::stop_token&) -> absl::StatusOr<FrameError> {
+           engine_.SetGate(false);
+           return ErrorOf(1.3 * kGoal, job);
+         }});
   auto frame = Submit(MustConvert(TargetRequest()), stop.get_token());
-  ASSERT_TRUE(WaitFor([&] { return engine_.refused() > 0; }));
+  ASSERT_TRUE(WaitFor([&] { return engine_.rendered() == 1 && engine_.waiting() == 1; }));
   stop.request_stop();
   EXPECT_EQ(frame.get().status().code(), absl::StatusCode::kCancelled);
+  EXPECT_EQ(engine_.rendered(), 1);
 }
 
 TEST_F(Search, EndOfTheEngineEndsTheFrame) {

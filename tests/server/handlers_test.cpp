@@ -11,6 +11,7 @@
 #include <gtest/gtest.h>
 
 #include "halflight/crc32c.h"
+#include "server/error_detail.h"
 #include "server/handlers/find_missing_particles.h"
 #include "server/handlers/get_server_info.h"
 #include "server/handlers/query_upload.h"
@@ -18,7 +19,6 @@
 #include "server/handlers/render_sequence.h"
 #include "server/handlers/upload_particles.h"
 #include "server/particle_files.h"
-#include "server/retry_hint.h"
 #include "tests/process/process.h"
 #include "tests/process/wait_for.h"
 #include "tests/server/fake_engine.h"
@@ -531,7 +531,7 @@ TEST_F(Sequence, FullQueueKeepsItsHint) {
   engine_.RefuseWith(absl::ResourceExhaustedError("full"));
   Play({Wrap(MakeRequest())});
   EXPECT_EQ(sink_.finished()->code(), absl::StatusCode::kResourceExhausted);
-  EXPECT_TRUE(RetryHint(*sink_.finished()).has_value());
+  EXPECT_TRUE(DetailOf(*sink_.finished()).retry_after.has_value());
 }
 
 TEST_F(Sequence, SlowReaderStopsTheReadingAhead) {

@@ -9,6 +9,7 @@
 #include <gtest/gtest.h>
 
 #include "server/unix_socket.h"
+#include "tests/process/process.h"
 
 namespace halflight {
 namespace {
@@ -33,7 +34,8 @@ std::string ErrorOf(const std::vector<const char*>& arguments) {
 TEST(Options, WithoutFlagsAreComplete) {
   const auto options = Parse({});
   ASSERT_TRUE(options.ok() && options->has_value()) << options.status();
-  EXPECT_THAT((*options)->addresses, ElementsAre("127.0.0.1:50551"));
+  EXPECT_THAT((*options)->addresses, ElementsAre());
+  EXPECT_FALSE((*options)->access.insecure_listen);
   EXPECT_GE((*options)->encode_threads, 1);
 }
 
@@ -91,7 +93,22 @@ TEST(Options, HelpNamesEveryFlagAndRunsNothing) {
                            "--cache-dir",
                            "--max-cache-dir-bytes",
                            "--max-partial-uploads",
-                           "--partial-upload-seconds"}) {
+                           "--partial-upload-seconds",
+                           "--max-client-frames",
+                           "--max-frame-bytes",
+                           "--max-frame-seconds",
+                           "--max-stall-seconds",
+                           "--max-calls",
+                           "--max-connections",
+                           "--max-connection-streams",
+                           "--max-handshake-seconds",
+                           "--max-idle-seconds",
+                           "--tls-cert",
+                           "--tls-key",
+                           "--tls-client-ca",
+                           "--token-file",
+                           "--insecure-listen",
+                           "--config"}) {
     EXPECT_THAT(out.str(), HasSubstr(flag));
   }
 }
@@ -120,6 +137,67 @@ TEST(Options, ErrorsNameFlagValueAndWhatIsAllowed) {
               HasSubstr("--frames-in-flight: 17, allowed: [0, 16]"));
   EXPECT_THAT(ErrorOf({"--no-such-flag"}), HasSubstr("--no-such-flag"));
   EXPECT_THAT(ErrorOf({"stray"}), HasSubstr("stray"));
+}
+
+TEST(Options, CertificateAndKeyComeTogether) {
+  EXPECT_THAT(ErrorOf({"--tls-cert", "a.pem"}), HasSubstr("--tls-key: "));
+  EXPECT_THAT(ErrorOf({"--tls-key", "a.pem"}), HasSubstr("--tls-cert: "));
+  EXPECT_THAT(ErrorOf({"--tls-client-ca", "a.pem"}),
+              HasSubstr("--tls-client-ca: a.pem, allowed: "));
+  EXPECT_THAT(ErrorOf({"--max-connections", "0"}), HasSubstr("--max-connections: 0, allowed: [1,"));
+  EXPECT_THAT(ErrorOf({"--max-idle-seconds", "0"}), HasSubstr("--max-idle-seconds: 0"));
+}
+
+class ConfigFile : public ::testing::Test {
+ protected:
+  [[nodiscard]] std::string Write(const std::string& text) const {
+    return folder_.Write("halflightd.conf", text);
+  }
+  const testing::Folder folder_;
+};
+
+TEST_F(ConfigFile, SaysAllThatFlagsSayALineEach) {
+  const std::string path = Write(
+      "# the render node\n"
+      "address = [\"127.0.0.1:1\", \"unix:/run/h/socket\"]\n"
+      "max-cache-bytes = 3GiB\n"
+      "max-slices=77\n"
+      "\n"
+      "insecure-listen = true\n"
+      "tls-cert = \"a b.pem\"\n"
+      "tls-key = k.pem\n");
+  const auto options = Parse({"--config", path.c_str()});
+  ASSERT_TRUE(options.ok() && options->has_value()) << options.status();
+  EXPECT_THAT((*options)->addresses, ElementsAre("127.0.0.1:1", "unix:/run/h/socket"));
+  EXPECT_EQ((*options)->limits.max_cache_bytes, 3 * kGiB);
+  EXPECT_EQ((*options)->limits.max_slices, 77U);
+  EXPECT_TRUE((*options)->access.insecure_listen);
+  EXPECT_EQ((*options)->access.tls.certificate, "a b.pem");
+  EXPECT_EQ((*options)->access.tls.key, "k.pem");
+}
+
+TEST_F(ConfigFile, GivesWayToFlags) {
+  const std::string path =
+      Write("address = [\"127.0.0.1:1\", \"127.0.0.1:2\"]\nmax-slices = 77\nmax-lights = 3\n");
+  const auto options =
+      Parse({"--max-slices", "5", "--config", path.c_str(), "--address", "127.0.0.1:3"});
+  ASSERT_TRUE(options.ok() && options->has_value()) << options.status();
+  EXPECT_THAT((*options)->addresses, ElementsAre("127.0.0.1:3"));
+  EXPECT_EQ((*options)->limits.max_slices, 5U);
+  EXPECT_EQ((*options)->limits.max_lights, 3U);
+}
+
+TEST_F(ConfigFile, ErrorsNameFileAndKey) {
+  const auto error = [this](const std::string& text) {
+    return ErrorOf({"--config", Write(text).c_str()});
+  };
+  const std::string path = folder_ / "halflightd.conf";
+  EXPECT_THAT(error("max-slices = 5\nmax-slizes = 5\n"), HasSubstr(path + ": max-slizes: is no"));
+  EXPECT_THAT(error("[part]\nmax-slices = 5\n"), HasSubstr(path + ": part."));
+  EXPECT_THAT(error("max-slices = many\n"), HasSubstr("max-slices"));
+  EXPECT_THAT(error("max-slices = many\n"), HasSubstr(path));
+  EXPECT_THAT(error("max-slices = 0\n"), HasSubstr("--max-slices: 0, allowed"));
+  EXPECT_THAT(ErrorOf({"--config", "/no/such/file"}), HasSubstr("/no/such/file"));
 }
 
 TEST(LimitsOnDevice, HoldLightBuffersToTexturesAndImagesToNone) {

@@ -32,7 +32,7 @@ using testing::WaitFor;
 
 class Service : public ::testing::Test {
  protected:
-  Service() {
+  explicit Service(const ServerLimits& limits = {}) : limits_(limits) {
     auto server = GrpcServer::Start({"127.0.0.1:0"}, backend_);
     EXPECT_TRUE(server.ok()) << server.status();
     server_ = *std::move(server);
@@ -158,7 +158,7 @@ TEST_F(Service, FullQueueSaysWhenToRetry) {
   for (int i = 0; i < 2; ++i) {
     clients.emplace_back([this] { EXPECT_TRUE(RenderAll(MakeRequest()).ok()); });
   }
-  ASSERT_TRUE(WaitFor([this] { return engine_.waiting() == 2; }));
+  ASSERT_TRUE(WaitFor([this] { return pipeline_.queued() == 2; }));
   grpc::ClientContext context;
   auto reader = stub_->RenderFrame(&context, MakeRequest());
   v1::RenderFrameResponse response;
@@ -166,6 +166,72 @@ TEST_F(Service, FullQueueSaysWhenToRetry) {
   EXPECT_EQ(reader->Finish().error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED);
   EXPECT_EQ(context.GetServerTrailingMetadata().count("grpc-retry-pushback-ms"), 1U);
   engine_.SetGate(true);
+}
+
+class ImpatientService : public Service {
+ protected:
+  ImpatientService() : Service({.max_stall_seconds = 1, .max_calls = 2}) {}
+};
+
+TEST_F(ImpatientService, ReaderThatStopsReadingLosesItsCallAndHoldsNothing) {
+  grpc::ClientContext context;
+  auto reader = stub_->RenderFrame(&context, LargeRequest());
+  v1::RenderFrameResponse response;
+  ASSERT_TRUE(reader->Read(&response));
+  EXPECT_FALSE(server_->idle());
+  EXPECT_TRUE(WaitFor([this] { return server_->idle(); })) << "the call waits for its reader";
+  while (reader->Read(&response)) {
+  }
+  EXPECT_EQ(reader->Finish().error_code(), grpc::StatusCode::CANCELLED);
+}
+
+TEST_F(ImpatientService, UploadThatStopsSendingLosesItsCall) {
+  grpc::ClientContext context;
+  v1::UploadParticlesResponse response;
+  const auto writer = stub_->UploadParticles(&context, &response);
+  ASSERT_TRUE(WaitFor([this] { return !server_->idle(); }));
+  EXPECT_TRUE(WaitFor([this] { return server_->idle(); })) << "the call waits for its writer";
+  EXPECT_EQ(writer->Finish().error_code(), grpc::StatusCode::CANCELLED);
+}
+
+TEST_F(ImpatientService, SequenceMayWaitForItsNextRequestAsLongAsItLikes) {
+  grpc::ClientContext context;
+  auto stream = stub_->RenderSequence(&context);
+  std::this_thread::sleep_for(std::chrono::milliseconds(1500));
+  v1::RenderSequenceRequest request;
+  *request.mutable_frame() = MakeRequest();
+  stream->Write(request);
+  stream->WritesDone();
+  v1::RenderSequenceResponse response;
+  while (stream->Read(&response)) {
+  }
+  const grpc::Status status = stream->Finish();
+  EXPECT_TRUE(status.ok()) << status.error_message();
+}
+
+TEST_F(ImpatientService, CallsBeyondTheLimitAreToldToComeBack) {
+  engine_.SetGate(false);
+  std::vector<std::jthread> clients;
+  for (int i = 0; i < 2; ++i) {
+    clients.emplace_back([this] { EXPECT_TRUE(RenderAll(MakeRequest()).ok()); });
+  }
+  ASSERT_TRUE(WaitFor([this] { return pipeline_.queued() == 2; }));
+  grpc::ClientContext context;
+  v1::GetServerInfoResponse info;
+  const grpc::Status status = stub_->GetServerInfo(&context, {}, &info);
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED);
+  EXPECT_THAT(status.error_details(), HasSubstr("TOO_MANY_CALLS"));
+  EXPECT_EQ(context.GetServerTrailingMetadata().count("grpc-retry-pushback-ms"), 1U);
+  engine_.SetGate(true);
+}
+
+TEST_F(Service, ErrorCarriesItsFieldForPrograms) {
+  v1::RenderFrameRequest request = MakeRequest();
+  request.mutable_scene()->mutable_shadow()->set_slices(4000000000U);
+  const grpc::Status status = RenderAll(request);
+  EXPECT_THAT(status.error_details(), HasSubstr("type.googleapis.com/google.rpc.BadRequest"));
+  EXPECT_THAT(status.error_details(), HasSubstr("LIMIT_EXCEEDED"));
+  EXPECT_THAT(status.error_details(), HasSubstr("scene.shadow.slices"));
 }
 
 TEST_F(Service, SequenceComesInOrderWhileRequestsGoOn) {

@@ -141,6 +141,7 @@ TEST_F(Killed, ServerAtAnyMomentLeavesWholeSetsOrNone) {
     }
     std::jthread client_thread([&, order = Below(sets.size())] {
       client::ClientOptions once;
+      once.timeout = std::chrono::seconds(1);
       once.max_attempts = 1;
       auto client = client::Client::Connect(address, once);
       for (size_t i = 0; i < sets.size(); ++i) {

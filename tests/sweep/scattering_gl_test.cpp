@@ -61,8 +61,8 @@ Scene AlongTheLight() {
   scene.lights = {test::Sun(travel)};
   scene.material.radius = 0.045F;
   scene.material.opacity = 0.03F;
-  scene.shadow.light_buffer_size = 320;
-  scene.shadow.slices = 512;
+  scene.shadow.light_buffer_size = 160;
+  scene.shadow.slices = 256;
   return scene;
 }
 

@@ -1,0 +1,125 @@
+#include "server/access/tls_files.h"
+
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <memory>
+#include <utility>
+
+#include <fmt/format.h>
+#include <openssl/bio.h>
+#include <openssl/err.h>
+#include <openssl/pem.h>
+#include <openssl/x509.h>
+
+namespace halflight {
+namespace {
+
+constexpr size_t kLargestFile = size_t{1} << 20U;
+
+struct Free {
+  void operator()(BIO* bio) const { BIO_free(bio); }
+  void operator()(X509* certificate) const { X509_free(certificate); }
+  void operator()(EVP_PKEY* key) const { EVP_PKEY_free(key); }
+  void operator()(std::FILE* file) const { std::fclose(file); }
+};
+template <typename T>
+using Owned = std::unique_ptr<T, Free>;
+
+absl::Status Wrong(const std::string& path, const std::string& why) {
+  ERR_clear_error();
+  return absl::InvalidArgumentError(fmt::format("{}: {}", path, why));
+}
+
+Owned<BIO> Reader(const std::string& text) {
+  return Owned<BIO>(BIO_new_mem_buf(text.data(), static_cast<int>(text.size())));
+}
+
+// Otherwise OpenSSL asks for one on the terminal.
+int NoPassword(char* /*buffer*/, int /*size*/, int /*writing*/, void* /*data*/) { return 0; }
+
+// The first of the file, which must be nothing but certificates.
+absl::StatusOr<Owned<X509>> FirstCertificate(const std::string& path, const std::string& text) {
+  const Owned<BIO> reader = Reader(text);
+  Owned<X509> first(PEM_read_bio_X509(reader.get(), nullptr, NoPassword, nullptr));
+  if (first == nullptr) {
+    return Wrong(path, "holds no certificate in PEM");
+  }
+  while (Owned<X509>(PEM_read_bio_X509(reader.get(), nullptr, NoPassword, nullptr)) != nullptr) {
+  }
+  // What ends the file in order is that no line begins another one.
+  if (ERR_GET_REASON(ERR_peek_last_error()) != PEM_R_NO_START_LINE) {
+    return Wrong(path, "a certificate behind the first is damaged");
+  }
+  ERR_clear_error();
+  return first;
+}
+
+absl::Status CheckTime(const std::string& path, const X509& certificate) {
+  if (X509_cmp_current_time(X509_get0_notAfter(&certificate)) <= 0) {
+    return Wrong(path, "the certificate has expired");
+  }
+  if (X509_cmp_current_time(X509_get0_notBefore(&certificate)) > 0) {
+    return Wrong(path, "the certificate is not valid yet");
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+absl::StatusOr<std::string> ReadSmallFile(const std::string& path) {
+  const Owned<std::FILE> file(std::fopen(path.c_str(), "rbe"));
+  if (file == nullptr) {
+    return Wrong(path, std::strerror(errno));
+  }
+  std::string bytes(kLargestFile + 1, '\0');
+  bytes.resize(std::fread(bytes.data(), 1, bytes.size(), file.get()));
+  if (std::ferror(file.get()) != 0) {
+    return Wrong(path, std::strerror(errno));
+  }
+  if (bytes.size() > kLargestFile) {
+    return Wrong(path, fmt::format("is too large, allowed: {} bytes", kLargestFile));
+  }
+  return bytes;
+}
+
+absl::StatusOr<TlsFiles> LoadTlsFiles(const TlsPaths& paths) {
+  TlsFiles files;
+  for (const auto& [path, text] :
+       {std::pair(&paths.certificate, &files.certificate), std::pair(&paths.key, &files.key),
+        std::pair(&paths.client_authorities, &files.client_authorities)}) {
+    if (path->empty()) {
+      continue;
+    }
+    auto bytes = ReadSmallFile(*path);
+    if (!bytes.ok()) {
+      return bytes.status();
+    }
+    *text = *std::move(bytes);
+  }
+  const auto certificate = FirstCertificate(paths.certificate, files.certificate);
+  if (!certificate.ok()) {
+    return certificate.status();
+  }
+  if (absl::Status status = CheckTime(paths.certificate, **certificate); !status.ok()) {
+    return status;
+  }
+  const Owned<EVP_PKEY> key(
+      PEM_read_bio_PrivateKey(Reader(files.key).get(), nullptr, NoPassword, nullptr));
+  if (key == nullptr) {
+    return Wrong(paths.key, "holds no private key in PEM without a password");
+  }
+  if (X509_check_private_key(certificate->get(), key.get()) != 1) {
+    return Wrong(paths.key,
+                 fmt::format("is not the key of the certificate in {}", paths.certificate));
+  }
+  if (!paths.client_authorities.empty()) {
+    const auto authority = FirstCertificate(paths.client_authorities, files.client_authorities);
+    if (!authority.ok()) {
+      return authority.status();
+    }
+  }
+  return files;
+}
+
+}  // namespace halflight

@@ -1,0 +1,67 @@
+#include "server/error_detail.h"
+
+#include "absl/strings/cord.h"
+#include "absl/strings/numbers.h"
+#include "renderer/field_error.h"
+#include "server/status_text.h"
+
+namespace halflight {
+namespace {
+
+constexpr char kReasonPayload[] = "halflight/reason";
+constexpr char kRetryPayload[] = "halflight/retry-after-ms";
+
+// About the time of a few frames: long enough for the queue to have moved.
+constexpr int kRetryAfterMs = 500;
+
+std::string PayloadOf(const absl::Status& status, const char* name) {
+  const absl::optional<absl::Cord> payload = status.GetPayload(name);
+  return payload.has_value() ? static_cast<std::string>(*payload) : std::string();
+}
+
+}  // namespace
+
+ErrorDetail DetailOf(const absl::Status& status) {
+  ErrorDetail detail;
+  detail.field = PayloadOf(status, kFieldPayload);
+  detail.value = PayloadOf(status, kValuePayload);
+  detail.allowed = PayloadOf(status, kAllowedPayload);
+  if (!v1::ErrorReason_Parse(PayloadOf(status, kReasonPayload), &detail.reason) &&
+      !detail.field.empty()) {
+    detail.reason = v1::ERROR_REASON_INVALID_FIELD;
+  }
+  int milliseconds = 0;
+  if (absl::SimpleAtoi(PayloadOf(status, kRetryPayload), &milliseconds)) {
+    detail.retry_after = std::chrono::milliseconds(milliseconds);
+  }
+  return detail;
+}
+
+absl::Status WithReason(absl::Status status, v1::ErrorReason reason) {
+  status.SetPayload(kReasonPayload, absl::Cord(v1::ErrorReason_Name(reason)));
+  return status;
+}
+
+absl::Status LimitError(const std::string& field, const std::string& value,
+                        const std::string& allowed) {
+  return WithReason(FieldError(field, value, allowed), v1::ERROR_REASON_LIMIT_EXCEEDED);
+}
+
+absl::Status BusyError(v1::ErrorReason reason, const std::string& message) {
+  return WithRetryHint(WithReason(absl::ResourceExhaustedError(message), reason));
+}
+
+absl::Status WithRetryHint(absl::Status status) {
+  status.SetPayload(kRetryPayload, absl::Cord(std::to_string(kRetryAfterMs)));
+  return status;
+}
+
+absl::Status Within(const std::string& path, const absl::Status& status) {
+  absl::Status within = Prefixed(path, status);
+  if (const std::string field = PayloadOf(status, kFieldPayload); !field.empty()) {
+    within.SetPayload(kFieldPayload, absl::Cord(path + field));
+  }
+  return within;
+}
+
+}  // namespace halflight

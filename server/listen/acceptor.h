@@ -1,0 +1,50 @@
+// The loop that accepts connections and hands them on. gRPC 1.51 gives its own listener up for good
+// the first time that descriptors run out; this one turns those away that it has no room for, and
+// goes on. Speaks no protocol.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <thread>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "server/listen/listening_socket.h"
+
+namespace halflight {
+
+class Acceptor {
+ public:
+  // Takes over a connected socket that does not block; the acceptor's thread.
+  using Serve = std::function<void(int fd)>;
+
+  // Listens on all sockets. With `max_connections` open, or without a descriptor left, a client
+  // that connects is disconnected at once, which gRPC reports as UNAVAILABLE: it can try elsewhere
+  // or later. Left waiting it would seem to be connected, and hang until its deadline. Unavailable
+  // where a socket cannot listen.
+  static absl::StatusOr<std::unique_ptr<Acceptor>> Start(std::vector<ListeningSocket> sockets,
+                                                         uint32_t max_connections, Serve serve);
+  // Stops.
+  ~Acceptor();
+  Acceptor(const Acceptor&) = delete;
+  Acceptor& operator=(const Acceptor&) = delete;
+
+  // Closes the sockets: nobody can connect any more, but those connected stay. When it has
+  // returned `serve` is not called again.
+  void Stop();
+
+ private:
+  class Loop;
+  explicit Acceptor(std::unique_ptr<Loop> loop);
+
+  std::unique_ptr<Loop> loop_;
+  std::thread thread_;
+};
+
+// Raises the process's limit on descriptors as far as it may go, and says how many connections fit
+// under it: the rest is for files, the device and the server itself.
+uint32_t RoomForConnections();
+
+}  // namespace halflight

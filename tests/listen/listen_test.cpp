@@ -1,0 +1,231 @@
+// Sockets, the loop that accepts, and what it does when there is no room: none of it knows gRPC.
+
+#include <algorithm>
+#include <atomic>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include <fcntl.h>
+#include <sys/resource.h>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "server/listen/acceptor.h"
+#include "server/listen/connections.h"
+#include "server/listen/listening_socket.h"
+#include "tests/listen/client_socket.h"
+#include "tests/process/process.h"
+#include "tests/process/wait_for.h"
+
+namespace halflight {
+namespace {
+
+using testing::ClientSocket;
+using testing::Folder;
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
+using testing::WaitFor;
+
+// What was accepted, kept open until it is dropped.
+class Served {
+ public:
+  ~Served() { DropAll(); }
+  void Take(int fd) {
+    const std::lock_guard lock(mutex_);
+    fds_.push_back(fd);
+  }
+  void DropAll() {
+    const std::lock_guard lock(mutex_);
+    std::for_each(fds_.begin(), fds_.end(), close);
+    fds_.clear();
+  }
+  [[nodiscard]] size_t size() const {
+    const std::lock_guard lock(mutex_);
+    return fds_.size();
+  }
+
+ private:
+  mutable std::mutex mutex_;
+  std::vector<int> fds_;
+};
+
+class AcceptorTest : public ::testing::Test {
+ protected:
+  void Listen(uint32_t max_connections) {
+    auto sockets = ListeningSocket::Bind("127.0.0.1:0");
+    ASSERT_TRUE(sockets.ok()) << sockets.status();
+    address_ = sockets->front().address();
+    auto acceptor =
+        Acceptor::Start(*std::move(sockets), max_connections, [this](int fd) { served_.Take(fd); });
+    ASSERT_TRUE(acceptor.ok()) << acceptor.status();
+    acceptor_ = *std::move(acceptor);
+  }
+  [[nodiscard]] ClientSocket Connect() const {
+    ClientSocket client;
+    EXPECT_TRUE(client.Connect(address_));
+    return client;
+  }
+
+  Served served_;
+  std::string address_;
+  std::unique_ptr<Acceptor> acceptor_;
+};
+
+TEST_F(AcceptorTest, HandsOverSocketsThatDoNotBlockNorStayInChildren) {
+  std::atomic<int> accepted = -1;
+  auto sockets = ListeningSocket::Bind("127.0.0.1:0");
+  ASSERT_TRUE(sockets.ok());
+  const std::string address = sockets->front().address();
+  const auto acceptor =
+      Acceptor::Start(*std::move(sockets), 10, [&accepted](int fd) { accepted = fd; });
+  ASSERT_TRUE(acceptor.ok());
+  ClientSocket client;
+  ASSERT_TRUE(client.Connect(address));
+  ASSERT_TRUE(WaitFor([&] { return accepted >= 0; }));
+  EXPECT_NE(fcntl(accepted, F_GETFL) & O_NONBLOCK, 0);
+  EXPECT_NE(fcntl(accepted, F_GETFD) & FD_CLOEXEC, 0);
+  close(accepted);
+}
+
+TEST_F(AcceptorTest, BeyondTheLimitHangsUpUntilOthersAreGone) {
+  Listen(3);
+  std::vector<ClientSocket> inside;
+  for (int i = 0; i < 3; ++i) {
+    inside.push_back(Connect());
+  }
+  ASSERT_TRUE(WaitFor([this] { return served_.size() == 3; }));
+  EXPECT_TRUE(Connect().HangsUpWithin(10000));
+  EXPECT_TRUE(Connect().HangsUpWithin(10000));
+  EXPECT_EQ(served_.size(), 3U);
+  served_.DropAll();
+  const ClientSocket again = Connect();
+  EXPECT_TRUE(WaitFor([this] { return served_.size() == 1; }));
+}
+
+// As long as this lives there is no descriptor left in this process.
+class NoDescriptorsLeft {
+ public:
+  NoDescriptorsLeft() {
+    getrlimit(RLIMIT_NOFILE, &before_);
+    rlimit lower = before_;
+    lower.rlim_cur = std::min<rlim_t>(before_.rlim_cur, 512);
+    setrlimit(RLIMIT_NOFILE, &lower);
+    for (int fd = 0; fd >= 0;) {
+      fd = dup(STDERR_FILENO);
+      if (fd >= 0) {
+        taken_.push_back(fd);
+      }
+    }
+  }
+  ~NoDescriptorsLeft() {
+    std::for_each(taken_.begin(), taken_.end(), close);
+    setrlimit(RLIMIT_NOFILE, &before_);
+  }
+  NoDescriptorsLeft(const NoDescriptorsLeft&) = delete;
+  NoDescriptorsLeft& operator=(const NoDescriptorsLeft&) = delete;
+
+ private:
+  rlimit before_{};
+  std::vector<int> taken_;
+};
+
+TEST_F(AcceptorTest, WithoutDescriptorsHangsUpAndGoesOnWhenThereAreSome) {
+  Listen(1000);
+  // Made before: this process has no more either.
+  std::vector<ClientSocket> early(20);
+  {
+    const NoDescriptorsLeft none;
+    for (const ClientSocket& client : early) {
+      ASSERT_TRUE(client.Connect(address_));
+    }
+    for (const ClientSocket& client : early) {
+      EXPECT_TRUE(client.HangsUpWithin(10000));
+    }
+    EXPECT_EQ(served_.size(), 0U);
+  }
+  const ClientSocket late = Connect();
+  EXPECT_TRUE(WaitFor([this] { return served_.size() == 1; }));
+}
+
+TEST_F(AcceptorTest, StoppedNobodyConnectsAndThoseInsideStay) {
+  Listen(10);
+  const ClientSocket inside = Connect();
+  ASSERT_TRUE(WaitFor([this] { return served_.size() == 1; }));
+  acceptor_->Stop();
+  EXPECT_FALSE(ClientSocket().Connect(address_));
+  EXPECT_FALSE(inside.HangsUpWithin(50));
+}
+
+TEST(Connections, CountWhatIsOpenWhoeverHasTheDescriptorsNow) {
+  Connections connections;
+  std::vector<ClientSocket> sockets(3);
+  for (const ClientSocket& socket : sockets) {
+    connections.Add(socket.fd());
+  }
+  EXPECT_EQ(connections.Count(), 3U);
+  EXPECT_TRUE(connections.AtLeast(3));
+  EXPECT_FALSE(connections.AtLeast(4));
+  // Another socket, and something that is none, under the same numbers.
+  const int first = sockets[0].fd();
+  const int second = sockets[1].fd();
+  const ClientSocket other;
+  dup2(other.fd(), first);
+  dup2(STDERR_FILENO, second);
+  EXPECT_EQ(connections.Count(), 1U);
+  sockets[2].Close();
+  EXPECT_EQ(connections.Count(), 0U);
+}
+
+TEST(ListeningSocket, TellsWhereItIsAndWhetherOthersCanConnect) {
+  const Folder folder;
+  const auto at = [](const std::string& address) {
+    auto sockets = ListeningSocket::Bind(address);
+    EXPECT_TRUE(sockets.ok()) << sockets.status();
+    return *std::move(sockets);
+  };
+  const auto v4 = at("127.0.0.1:0");
+  ASSERT_EQ(v4.size(), 1U);
+  EXPECT_THAT(v4[0].address(), StartsWith("127.0.0.1:"));
+  EXPECT_THAT(v4[0].address(), ::testing::Not(::testing::EndsWith(":0")));
+  EXPECT_TRUE(v4[0].local());
+  EXPECT_TRUE(at("127.9.8.7:0")[0].local());
+  EXPECT_TRUE(at("unix:" + folder / "socket")[0].local());
+  // Bound, but not listening: nobody can connect to these.
+  EXPECT_FALSE(at("0.0.0.0:0")[0].local());
+  for (const ListeningSocket& socket : at("localhost:0")) {
+    EXPECT_TRUE(socket.local());
+    EXPECT_THAT(socket.address(), StartsWith("localhost:"));
+  }
+}
+
+TEST(ListeningSocket, ErrorsNameTheAddress) {
+  auto first = ListeningSocket::Bind("127.0.0.1:0");
+  ASSERT_TRUE(first.ok());
+  ASSERT_TRUE(first->front().Listen().ok());
+  const std::string taken = first->front().address();
+  EXPECT_THAT(std::string(ListeningSocket::Bind(taken).status().message()),
+              HasSubstr("--address " + taken + ": cannot listen there: Address already in use"));
+  EXPECT_THAT(std::string(ListeningSocket::Bind("no.such.host.invalid:1").status().message()),
+              HasSubstr("--address no.such.host.invalid:1: no such host"));
+  EXPECT_THAT(std::string(ListeningSocket::Bind("192.0.2.1:1").status().message()),
+              HasSubstr("--address 192.0.2.1:1: cannot listen there"));
+}
+
+TEST(ListeningSocket, AdoptsOnlyWhatListens) {
+  auto bound = ListeningSocket::Bind("127.0.0.1:0");
+  ASSERT_TRUE(bound.ok());
+  EXPECT_FALSE(ListeningSocket::Adopt(bound->front().fd()).ok());
+  ASSERT_TRUE(bound->front().Listen().ok());
+  const auto adopted = ListeningSocket::Adopt(dup(bound->front().fd()));
+  ASSERT_TRUE(adopted.ok()) << adopted.status();
+  EXPECT_EQ(adopted->address(), bound->front().address());
+  EXPECT_TRUE(adopted->local());
+  EXPECT_FALSE(ListeningSocket::Adopt(STDERR_FILENO).ok());
+  EXPECT_FALSE(ListeningSocket::Adopt(12345).ok());
+}
+
+}  // namespace
+}  // namespace halflight
