@@ -83,10 +83,9 @@ TEST_F(ClientTest, TriesAgainWhenTheServerIsBusy) {
   const EncodedParticles particles = SomeParticles(1);
   const auto frame = Connect().RenderFrame(SomeRequest(), &particles);
   ASSERT_TRUE(frame.ok()) << frame.status();
+  EXPECT_EQ(service_.Calls("QueryUpload"), 5) << "each try of an upload begins with one";
   EXPECT_EQ(service_.Calls("UploadParticles"), 3);
   EXPECT_EQ(service_.Calls("RenderFrame"), 3);
-  // Until it is answered, and again before each further try of the upload.
-  EXPECT_EQ(service_.Calls("QueryUpload"), 5);
 }
 
 TEST_F(ClientTest, UploadGoesOnWhereItBrokeOff) {

@@ -283,9 +283,11 @@ TEST_F(Files, DirectoryWithoutPermissionIsNamed) {
     GTEST_SKIP() << "needs to be root, to become somebody else";
   }
   fs::create_directory(path_);
-  fs::permissions(path_, fs::perms::owner_all | fs::perms::group_read | fs::perms::group_exec);
-  fs::permissions(folder_.path(),
-                  fs::perms::owner_all | fs::perms::group_exec | fs::perms::others_exec);
+  constexpr fs::perms kReadable = fs::perms::owner_all | fs::perms::group_read |
+                                  fs::perms::group_exec | fs::perms::others_read |
+                                  fs::perms::others_exec;
+  fs::permissions(path_, kReadable);
+  fs::permissions(folder_.path(), kReadable);
   ASSERT_EQ(seteuid(65534), 0);
   const auto refused = ParticleFiles::Open(path_, limits_);
   ASSERT_EQ(seteuid(0), 0);

@@ -43,6 +43,13 @@ v1::InlineParticles SetOf(int particles) {
   return MakeParticles(particles, {v1::PARTICLE_ATTRIBUTE_POSITION});
 }
 
+// Renders sets that have no radius of their own.
+v1::RenderFrameRequest Request() {
+  v1::RenderFrameRequest request = testing::MakeRequest();
+  request.mutable_scene()->mutable_material()->set_radius(0.1F);
+  return request;
+}
+
 client::EncodedParticles Encoded(int particles) {
   const v1::InlineParticles set = SetOf(particles);
   return {set.layout(), set.payload(), Describe(set).sha256()};
@@ -141,7 +148,7 @@ TEST_F(Killed, ServerAtAnyMomentLeavesWholeSetsOrNone) {
         client->EnsureUploaded(sets[(i + order) % sets.size()]).IgnoreError();
       }
     });
-    std::this_thread::sleep_for(std::chrono::milliseconds(Below(40)));
+    std::this_thread::sleep_for(std::chrono::milliseconds(Below(200)));
     server.Signal(SIGKILL);
     EXPECT_EQ(server.Wait(), -1);
     client_thread.join();
@@ -179,8 +186,7 @@ TEST_F(Killed, ServerAtAnyMomentLeavesWholeSetsOrNone) {
   for (const bool sequence : {false, true}) {
     Process restarted(folder_, "halflightd_fake", {"--address", address, "--cache-dir", cache});
     auto client = client::Client::Connect(address, options);
-    v1::RenderFrameRequest request = testing::MakeRequest();
-    request.mutable_scene()->mutable_material()->set_radius(0.1F);
+    v1::RenderFrameRequest request = Request();
     request.mutable_scene()->set_particle_sha256(large.sha256);
     if (sequence) {
       status = client->RenderSequence(
@@ -217,9 +223,7 @@ TEST_F(Killed, DamagedSetIsSentAgainByTheClientWithoutAWord) {
   ASSERT_EQ(folder_.Write("cache/" + ToHex(particles.sha256) + ".particles", bytes), file);
   const Process server(folder_, "halflightd_fake", flags);
   auto client = client::Client::Connect(address);
-  v1::RenderFrameRequest request = testing::MakeRequest();
-  request.mutable_scene()->mutable_material()->set_radius(0.1F);
-  const auto frame = client->RenderFrame(request, &particles);
+  const auto frame = client->RenderFrame(Request(), &particles);
   ASSERT_TRUE(frame.ok()) << frame.status();
   EXPECT_THAT(server.Err(), HasSubstr("is missing now: its SHA-256 is"));
   EXPECT_EQ(client->upload_totals().sent_bytes, 12000U);
