@@ -147,7 +147,9 @@ absl::Status FramePipeline::Submit(FrameJob job, std::stop_token stop, Done done
   flight->done = std::move(done);
   flight->submitted = Clock::now();
   flight->on_client_stop.emplace(std::move(stop), [source = flight->stop] {
-    std::stop_source kept = source;  // the callback may go with the flight meanwhile
+    // The callback, and its source, may go with the flight meanwhile.
+    // NOLINTNEXTLINE(performance-unnecessary-copy-initialization)
+    const std::stop_source kept = source;
     kept.request_stop();
   });
   if (flight->job.target.has_value()) {
