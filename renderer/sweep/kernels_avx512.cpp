@@ -7,10 +7,13 @@
 #define HALFLIGHT_LANES 16
 #include "renderer/sweep/simd.h"
 
-// The blur goes over lines of eight floats: kernel_sets.cpp takes that of AVX2.
+// The blur goes over lines of eight floats: kernel_sets.cpp takes that of AVX2, and this one is
+// never called.
 namespace halflight::sweep::avx512 {
-static constexpr void (*BlurLine)(const BlurLineJob& job) = nullptr;
-}
+namespace {
+[[noreturn]] void BlurLine(const BlurLineJob& /*job*/) { __builtin_trap(); }
+}  // namespace
+}  // namespace halflight::sweep::avx512
 
 #define HALFLIGHT_KERNEL_SET avx512
 #include "renderer/sweep/kernels.inc"

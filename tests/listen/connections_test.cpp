@@ -23,7 +23,6 @@ namespace {
 
 using std::chrono::milliseconds;
 using Clock = std::chrono::steady_clock;
-using testing::CallRaw;
 using testing::ClientSocket;
 using testing::Daemon;
 using testing::Folder;

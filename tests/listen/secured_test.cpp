@@ -115,7 +115,7 @@ TEST_F(Secured, LogSaysWhoseFramesTheyAre) {
   for (const auto& [id, tenant] :
        {std::pair("by-token", "alice"), std::pair("by-name", "bob"),
         std::pair("by-dns", "bob.example"), std::pair("by-uri", "spiffe://example/bob")}) {
-    EXPECT_TRUE(WaitFor([&] {
+    EXPECT_TRUE(WaitFor([&, id = id, tenant = tenant] {
       return server.Logged(
           fmt::format("frame request_id=\"{}\" tenant=\"{}\" peer=\"ipv4:127.0.0.1:", id, tenant));
     })) << server.Err();

@@ -17,8 +17,6 @@
 namespace halflight {
 namespace {
 
-using ::testing::HasSubstr;
-
 // A frame of a sequence, and what becomes of it.
 struct Shot {
   std::string name;

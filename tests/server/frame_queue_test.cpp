@@ -38,7 +38,7 @@ class ManualEngine : public FrameEngine {
   absl::Status refusal;
 
  private:
-  const DeviceInfo device_;
+  const DeviceInfo device_{};
   std::deque<Done> jobs_;
 };
 

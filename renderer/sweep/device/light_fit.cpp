@@ -31,7 +31,7 @@ const gl::ProgramSource& FitProgram() {
 // Terms by terms floats, in vectors of four.
 gl::Buffer UploadInverseGram(const DiscFit& disc) {
   shader::InverseGramBlock block = {};
-  const std::vector<double> inverse_gram = disc.inverse_gram();
+  const std::vector<double>& inverse_gram = disc.inverse_gram();
   for (size_t i = 0; i < inverse_gram.size(); ++i) {
     block.rows[i / 4][static_cast<glm::length_t>(i % 4)] = static_cast<float>(inverse_gram[i]);
   }
