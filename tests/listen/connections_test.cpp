@@ -1,7 +1,6 @@
 // A listener that cannot be killed: crowds, garbage, half-open connections, no descriptors left.
 
 #include <sys/resource.h>
-#include <cstdlib>
 
 #include <algorithm>
 #include <atomic>
@@ -158,7 +157,7 @@ TEST(Connections, WithoutDescriptorsThoseInsideAreServedAndOthersWhenSomeAreFree
 }
 
 TEST(Connections, BeyondTheirLimitAreClosedAtOnceAndTellItInTheLog) {
-  if (std::getenv("HALFLIGHT_LONG_TESTS") == nullptr) {
+  if (!LongTests()) {
     GTEST_SKIP() << "the daemon takes ten seconds to refuse, and once did not tell; AcceptorTest "
                     "holds the acceptor alone to it";
   }
