@@ -1,7 +1,10 @@
 // The narrow interface through which a service sees the renderer, so that it is tested without GL.
 #pragma once
 
+#include <chrono>
+#include <cstdint>
 #include <functional>
+#include <optional>
 #include <stop_token>
 #include <string>
 
@@ -16,6 +19,15 @@ struct DeviceInfo {
   std::string gl_version;
   int max_texture_size = 0;
   bool software = false;  // a CPU rasteriser
+};
+
+// How an engine is doing at the moment.
+struct EngineState {
+  uint64_t gl_objects = 0;  // buffers and textures
+  uint64_t gl_bytes = 0;    // that they take on the device
+  uint64_t device_resets = 0;
+  // Since when its thread is at the same half of a frame; none while it waits for frames.
+  std::optional<std::chrono::steady_clock::time_point> busy_since{};
 };
 
 class FrameEngine {
@@ -33,6 +45,9 @@ class FrameEngine {
 
   // The same at all times. Any thread.
   [[nodiscard]] virtual const DeviceInfo& device() const = 0;
+
+  // Any thread.
+  [[nodiscard]] virtual EngineState state() const { return {}; }
 };
 
 }  // namespace halflight
