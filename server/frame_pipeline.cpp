@@ -212,8 +212,8 @@ void FramePipeline::Render(const FlightPtr& flight, FrameRequest request, Stage 
   const size_t images = request.images.size();
   queue_.Push({.client = flight->job.caller.client(),
                .priority = flight->job.priority,
-               .fingerprint = flight->job.fingerprint,
                .goes_on = flight->rendering_begun,
+               .fingerprint = flight->job.fingerprint,
                .request = std::move(request),
                .stop = flight->stop.get_token(),
                .begun = [this, flight] { OnBegun(flight); },

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <deque>
 #include <future>
 #include <memory>
@@ -137,16 +138,24 @@ TEST_F(DeviceReset, WithoutAnotherDeviceEndsTheEngine) {
 
 TEST_F(DeviceReset, WithoutMemoryIsTriedAgainWithoutWhatWasKept) {
   Start("out-of-memory:2,out-of-memory:4-5");
+  const auto reused = [](const FrameResult& frame) {
+    return std::any_of(frame.plan.passes.begin(), frame.plan.passes.end(),
+                       [](const PlannedPass& pass) { return pass.count == 0; });
+  };
   const Frame first = Render();
   const Frame tried_again = Render();  // drawings 2 and 3
   ASSERT_TRUE(tried_again.ok()) << tried_again.status();
   EXPECT_TRUE(tried_again->images.at(0).pixels == first->images.at(0).pixels);
+  EXPECT_FALSE(reused(*tried_again));
   const Frame without = Render();  // 4 and 5
   EXPECT_TRUE(absl::IsResourceExhausted(without.status())) << without.status();
   EXPECT_FALSE(IsDeviceReset(without.status()));
-  const Frame after = Render();
-  ASSERT_TRUE(after.ok()) << after.status();
-  EXPECT_TRUE(after->images.at(0).pixels == first->images.at(0).pixels);
+  for (const bool later : {false, true}) {
+    const Frame after = Render();
+    ASSERT_TRUE(after.ok()) << after.status();
+    EXPECT_TRUE(after->images.at(0).pixels == first->images.at(0).pixels);
+    EXPECT_EQ(reused(*after), later);
+  }
   EXPECT_EQ(engine_->state().device_resets, 0U);
 }
 
