@@ -142,16 +142,17 @@ TEST_F(DeviceReset, WithoutMemoryIsTriedAgainWithoutWhatWasKept) {
     return std::any_of(frame.plan.passes.begin(), frame.plan.passes.end(),
                        [](const PlannedPass& pass) { return pass.count == 0; });
   };
-  const Frame first = Render();
-  const Frame tried_again = Render();  // drawings 2 and 3
+  const FrameRequest request = Request();
+  const Frame first = Render(request);
+  const Frame tried_again = Render(request);  // drawings 2 and 3
   ASSERT_TRUE(tried_again.ok()) << tried_again.status();
   EXPECT_TRUE(tried_again->images.at(0).pixels == first->images.at(0).pixels);
   EXPECT_FALSE(reused(*tried_again));
-  const Frame without = Render();  // 4 and 5
+  const Frame without = Render(request);  // 4 and 5
   EXPECT_TRUE(absl::IsResourceExhausted(without.status())) << without.status();
   EXPECT_FALSE(IsDeviceReset(without.status()));
   for (const bool later : {false, true}) {
-    const Frame after = Render();
+    const Frame after = Render(request);
     ASSERT_TRUE(after.ok()) << after.status();
     EXPECT_TRUE(after->images.at(0).pixels == first->images.at(0).pixels);
     EXPECT_EQ(reused(*after), later);
