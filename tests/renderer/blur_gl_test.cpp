@@ -4,67 +4,25 @@
 #include <cmath>
 
 #include "tests/renderer/gl_fixture.h"
+#include "tests/renderer/scattering_column.h"
 
 namespace halflight {
 namespace {
 
 class Blur : public test::GlTest {
  protected:
-  // A faint occluder at the top of a column, 2 units long, of particles too faint to shadow, wide
-  // enough that the light buffer holds the spread occluder. The light travels down the column, and
-  // the camera looks at right angles to it.
-  static Scene Column() {
-    Scene scene;
-    auto set = std::make_shared<ParticleSet>();
-    set->positions.emplace_back(0.0F, 0.0F, 0.0F);
-    set->radii.push_back(0.1F);
-    set->opacities.push_back(0.01F);
-    const glm::vec2 corners[] = {{-1.5F, -1.5F}, {1.5F, -1.5F}, {-1.5F, 1.5F}, {1.5F, 1.5F}};
-    for (int k = 0; k < 2048; ++k) {
-      const glm::vec2 corner = corners[k % 4];
-      set->positions.emplace_back(corner.x, -2.0F * static_cast<float>(k) / 2047.0F, corner.y);
-      set->radii.push_back(0.05F);
-      set->opacities.push_back(1e-9F);
-    }
-    scene.particles = set;
-    scene.camera = test::LookAt({0, 5, 0.001}, {0, -1, 0}, 16, 16);
-    scene.lights = {test::Sun({0, -1, 0})};
-    scene.material.scattering_spread = 0.15F;
-    scene.shadow.light_buffer_size = 256;
-    return scene;
-  }
+  // The camera looks at right angles to the light.
+  static Scene Column() { return test::ScatteringColumn({0, 5, 0.001}); }
 
-  // Standard deviation along the buffer's x of the optical depth, world units.
-  static double Width(const FrameResult& frame) {
-    const Image& image = frame.images[0];
-    double sum = 0.0;
-    double first = 0.0;
-    double second = 0.0;
-    for (int y = 0; y < image.height; ++y) {
-      for (int x = 0; x < image.width; ++x) {
-        const double depth = std::max(*test::PixelAt(image, x, y), 0.0F);
-        sum += depth;
-        first += depth * x;
-        second += depth * x * x;
-      }
-    }
-    const glm::dmat4& texture = frame.lights[0].light_texture_from_world;
-    const double texels_per_unit =
-        glm::length(glm::dvec3(texture[0][0], texture[1][0], texture[2][0])) * image.width;
-    return std::sqrt(second / sum - std::pow(first / sum, 2)) / texels_per_unit;
-  }
-
-  static FrameResult RenderDepth(const Scene& scene) {
-    return Render({scene, {{ImageKind::kLightBuffer, 0, LightQuantity::kOpticalDepth}}});
-  }
+  static double Width(const Scene& scene) { return test::BeamWidth(Render(test::BeamOf(scene))); }
 };
 
 TEST_F(Blur, IsAsWideWithSixteenSlicesAsWithTwoHundredAndFiftySix) {
   Scene scene = Column();
   scene.shadow.slices = 16;
-  const double coarse = Width(RenderDepth(scene));
+  const double coarse = Width(scene);
   scene.shadow.slices = 256;
-  const double fine = Width(RenderDepth(scene));
+  const double fine = Width(scene);
   RecordProperty("width_16_over_256", std::to_string(coarse / fine));
   EXPECT_NEAR(coarse / fine, 1.0, 0.03);
 }
@@ -72,9 +30,9 @@ TEST_F(Blur, IsAsWideWithSixteenSlicesAsWithTwoHundredAndFiftySix) {
 TEST_F(Blur, HasTheVarianceOfItsDistance) {
   Scene scene = Column();
   scene.shadow.slices = 256;
-  const double blurred = Width(RenderDepth(scene));
+  const double blurred = Width(scene);
   scene.material.scattering_spread = 0.0F;
-  const double sharp = Width(RenderDepth(scene));
+  const double sharp = Width(scene);
   // 2 world units of travel at 0.15 a unit.
   EXPECT_NEAR(std::sqrt(blurred * blurred - sharp * sharp), 0.15 * std::sqrt(2.0), 0.005);
 }
@@ -82,9 +40,9 @@ TEST_F(Blur, HasTheVarianceOfItsDistance) {
 TEST_F(Blur, DoesNotDependOnTheResolutionOfTheLightBuffer) {
   Scene scene = Column();
   scene.shadow.light_buffer_size = 128;
-  const double coarse = Width(RenderDepth(scene));
+  const double coarse = Width(scene);
   scene.shadow.light_buffer_size = 512;
-  EXPECT_NEAR(coarse / Width(RenderDepth(scene)), 1.0, 0.03);
+  EXPECT_NEAR(coarse / Width(scene), 1.0, 0.03);
 }
 
 TEST_F(Blur, OfTexelsPerSliceFollowsTheSlicesAsThePublishedSampleDoes) {
@@ -93,9 +51,9 @@ TEST_F(Blur, OfTexelsPerSliceFollowsTheSlicesAsThePublishedSampleDoes) {
   scene.shadow.blur_mode = BlurMode::kTexelsPerSlice;
   scene.shadow.blur_texels = 1.0F;
   scene.shadow.slices = 16;
-  const double few = Width(RenderDepth(scene));
+  const double few = Width(scene);
   scene.shadow.slices = 128;
-  EXPECT_GT(Width(RenderDepth(scene)), 1.8 * few);
+  EXPECT_GT(Width(scene), 1.8 * few);
 }
 
 TEST_F(Blur, OfAnyWidthEndsAndKeepsTheLight) {
@@ -115,9 +73,9 @@ TEST_F(Blur, InStridesHasTheVarianceOfOnePass) {
   Scene scene = Column();
   scene.shadow.slices = 2;
   scene.shadow.light_buffer_size = 1024;  // 2 units at 0.15: a deviation of about 50 texels
-  const double strided = Width(RenderDepth(scene));
+  const double strided = Width(scene);
   scene.shadow.light_buffer_size = 128;  // and here of 6
-  EXPECT_NEAR(strided / Width(RenderDepth(scene)), 1.0, 0.02);
+  EXPECT_NEAR(strided / Width(scene), 1.0, 0.02);
 }
 
 TEST_F(Blur, LetsLightIntoTheShadow) {

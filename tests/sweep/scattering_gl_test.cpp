@@ -9,6 +9,7 @@
 
 #include "tests/oracle/plume.h"
 #include "tests/renderer/gl_fixture.h"
+#include "tests/renderer/scattering_column.h"
 
 namespace halflight {
 namespace {
@@ -25,28 +26,7 @@ double RootMeanSquare(const Image& a, const Image& b) {
   return std::sqrt(squares / static_cast<double>(a.pixels.size()));
 }
 
-// A faint occluder at the top of a column, 2 units long, of particles too faint to shadow, wide
-// enough that the light buffer holds the spread occluder. The light travels down the column.
-Scene Column() {
-  Scene scene;
-  auto set = std::make_shared<ParticleSet>();
-  set->positions.emplace_back(0.0F, 0.0F, 0.0F);
-  set->radii.push_back(0.1F);
-  set->opacities.push_back(0.01F);
-  const glm::vec2 corners[] = {{-1.5F, -1.5F}, {1.5F, -1.5F}, {-1.5F, 1.5F}, {1.5F, 1.5F}};
-  for (int k = 0; k < 2048; ++k) {
-    const glm::vec2 corner = corners[k % 4];
-    set->positions.emplace_back(corner.x, -2.0F * static_cast<float>(k) / 2047.0F, corner.y);
-    set->radii.push_back(0.05F);
-    set->opacities.push_back(1e-9F);
-  }
-  scene.particles = set;
-  scene.camera = test::LookAt({3, 5, 1}, {0, -1, 0}, 16, 16);
-  scene.lights = {test::Sun({0, -1, 0})};
-  scene.material.scattering_spread = 0.15F;
-  scene.shadow.light_buffer_size = 256;
-  return scene;
-}
+Scene Column() { return test::ScatteringColumn({3, 5, 1}); }
 
 // Looks along the light, whose rays are the camera's, at a plume that is thin enough for half-angle
 // slicing to come near its limit.
@@ -73,27 +53,7 @@ class ScatteringIn : public test::GlTest, public testing::WithParamInterface<Sha
     return scene;
   }
 
-  // Standard deviation along the buffer's x of the optical depth behind all, world units.
-  static double Width(const Scene& scene) {
-    const FrameResult frame =
-        Render({scene, {{ImageKind::kLightBuffer, 0, LightQuantity::kOpticalDepth}}});
-    const Image& image = frame.images[0];
-    double sum = 0.0;
-    double first = 0.0;
-    double second = 0.0;
-    for (int y = 0; y < image.height; ++y) {
-      for (int x = 0; x < image.width; ++x) {
-        const double depth = std::max(*test::PixelAt(image, x, y), 0.0F);
-        sum += depth;
-        first += depth * x;
-        second += depth * x * x;
-      }
-    }
-    const glm::dmat4& texture = frame.lights[0].light_texture_from_world;
-    const double texels_per_unit =
-        glm::length(glm::dvec3(texture[0][0], texture[1][0], texture[2][0])) * image.width;
-    return std::sqrt(second / sum - std::pow(first / sum, 2)) / texels_per_unit;
-  }
+  static double Width(const Scene& scene) { return test::BeamWidth(Render(test::BeamOf(scene))); }
 };
 
 TEST_P(ScatteringIn, ABeamIsAsWideWithSixteenSlabsAsWithTwoHundredAndFiftySix) {
