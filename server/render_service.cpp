@@ -2,10 +2,12 @@
 
 #include <atomic>
 #include <chrono>
+#include <functional>
 #include <optional>
 #include <utility>
 
 #include <fmt/format.h>
+#include <spdlog/spdlog.h>
 
 #include "absl/status/status.h"
 #include "halflight/v1/service.grpc.pb.h"
@@ -97,6 +99,14 @@ std::chrono::seconds StallLimit(const Backend& backend) {
   return std::chrono::seconds(backend.limits.max_stall_seconds);
 }
 
+// What becomes of a call whose peer stalls.
+std::function<void()> Cancelling(const Backend& backend, CallbackServerContext& context) {
+  return [&context, seconds = backend.limits.max_stall_seconds] {
+    spdlog::warn("call stalled peer={} seconds={}", context.peer(), seconds);
+    context.TryCancel();
+  };
+}
+
 class UploadCall final : public grpc::ServerReadReactor<v1::UploadParticlesRequest> {
  public:
   UploadCall(Shared& shared, CallbackServerContext& context, v1::UploadParticlesResponse& response)
@@ -104,7 +114,7 @@ class UploadCall final : public grpc::ServerReadReactor<v1::UploadParticlesReque
         context_(context),
         response_(response),
         handler_(shared.backend),
-        stall_(shared.timer, StallLimit(shared.backend), context) {
+        stall_(shared.timer, StallLimit(shared.backend), Cancelling(shared.backend, context)) {
     if (!token_.refusal().ok()) {
       Answer(token_.refusal());
     } else {
@@ -162,7 +172,7 @@ class RenderFrameCall final : public grpc::ServerWriteReactor<grpc::ByteBuffer>,
   RenderFrameCall(Shared& shared, CallbackServerContext& context, const grpc::ByteBuffer& request)
       : token_(shared.count, shared.backend.limits, shared.access, context),
         context_(context),
-        stall_(shared.timer, StallLimit(shared.backend), context),
+        stall_(shared.timer, StallLimit(shared.backend), Cancelling(shared.backend, context)),
         handler_(std::make_shared<RenderFrameHandler>(shared.backend, *this, token_.caller())) {
     if (v1::RenderFrameRequest message; !token_.refusal().ok()) {
       RenderFrameCall::Finish(token_.refusal());
@@ -204,7 +214,7 @@ class RenderSequenceCall final : public grpc::ServerBidiReactor<grpc::ByteBuffer
   RenderSequenceCall(Shared& shared, CallbackServerContext& context)
       : token_(shared.count, shared.backend.limits, shared.access, context),
         context_(context),
-        stall_(shared.timer, StallLimit(shared.backend), context),
+        stall_(shared.timer, StallLimit(shared.backend), Cancelling(shared.backend, context)),
         handler_(std::make_shared<RenderSequenceHandler>(shared.backend, *this, token_.caller())) {
     if (!token_.refusal().ok()) {
       RenderSequenceCall::Finish(token_.refusal());

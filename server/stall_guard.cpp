@@ -1,39 +1,37 @@
 #include "server/stall_guard.h"
 
 #include <mutex>
-
-#include <spdlog/spdlog.h>
+#include <utility>
 
 namespace halflight {
 
-// What the timer's call may still hold when the guard and its context are gone.
+// What the timer's call may still hold when the guard and what it stands for are gone.
 struct StallGuard::Call {
-  // Recursive: gRPC may end the call, and with it the guard, before TryCancel returns.
+  // Recursive: ending the call may end the guard before `stalled` returns.
   std::recursive_mutex mutex;
-  grpc::CallbackServerContext* context;  // null: gone
+  std::function<void()> stalled;
+  bool gone = false;
 };
 
-StallGuard::StallGuard(Timer& timer, std::chrono::seconds limit,
-                       grpc::CallbackServerContext& context)
+StallGuard::StallGuard(Timer& timer, std::chrono::milliseconds limit, std::function<void()> stalled)
     : timer_(timer), limit_(limit), call_(std::make_shared<Call>()) {
-  call_->context = &context;
+  call_->stalled = std::move(stalled);
 }
 
 StallGuard::~StallGuard() {
   End();
   const std::lock_guard lock(call_->mutex);
-  call_->context = nullptr;
+  call_->gone = true;
 }
 
 void StallGuard::Begin() {
   if (limit_.count() == 0) {
     return;
   }
-  ticket_ = timer_.At(Timer::Clock::now() + limit_, [call = call_, limit = limit_] {
+  ticket_ = timer_.At(Timer::Clock::now() + limit_, [call = call_] {
     const std::lock_guard lock(call->mutex);
-    if (call->context != nullptr) {
-      spdlog::warn("call stalled peer={} seconds={}", call->context->peer(), limit.count());
-      call->context->TryCancel();
+    if (!call->gone) {
+      call->stalled();
     }
   });
 }
