@@ -9,6 +9,8 @@
 #include "absl/status/statusor.h"
 #include "server/access/access.h"
 #include "server/limits.h"
+#include "server/log/log.h"
+#include "server/metrics/metrics_server.h"
 
 namespace halflight {
 
@@ -22,6 +24,9 @@ struct Options {
   std::string device = "auto";  // as in RenderThreadOptions
   ServerLimits limits;
   std::string log_level = "info";
+  LogFormat log_format = LogFormat::kText;
+  MetricsOptions metrics;
+  bool channelz = false;   // as in GrpcServerOptions
   int encode_threads = 0;  // filled in: one for each core, less the one that renders
   int drain_seconds = 30;
   std::string cache_dir;                // empty: particle sets are kept in memory only

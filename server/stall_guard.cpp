@@ -2,27 +2,24 @@
 
 #include <mutex>
 
-#include <spdlog/spdlog.h>
-
 namespace halflight {
 
-// What the timer's call may still hold when the guard and its context are gone.
+// What the timer's call may still hold when the guard and its call are gone.
 struct StallGuard::Call {
-  // Recursive: gRPC may end the call, and with it the guard, before TryCancel returns.
+  // Recursive: gRPC may end the call, and with it the guard, before EndForStall returns.
   std::recursive_mutex mutex;
-  grpc::CallbackServerContext* context;  // null: gone
+  CallToken* token;  // null: gone
 };
 
-StallGuard::StallGuard(Timer& timer, std::chrono::seconds limit,
-                       grpc::CallbackServerContext& context)
+StallGuard::StallGuard(Timer& timer, std::chrono::seconds limit, CallToken& call)
     : timer_(timer), limit_(limit), call_(std::make_shared<Call>()) {
-  call_->context = &context;
+  call_->token = &call;
 }
 
 StallGuard::~StallGuard() {
   End();
   const std::lock_guard lock(call_->mutex);
-  call_->context = nullptr;
+  call_->token = nullptr;
 }
 
 void StallGuard::Begin() {
@@ -31,9 +28,8 @@ void StallGuard::Begin() {
   }
   ticket_ = timer_.At(Timer::Clock::now() + limit_, [call = call_, limit = limit_] {
     const std::lock_guard lock(call->mutex);
-    if (call->context != nullptr) {
-      spdlog::warn("call stalled peer={} seconds={}", call->context->peer(), limit.count());
-      call->context->TryCancel();
+    if (call->token != nullptr) {
+      call->token->EndForStall(limit);
     }
   });
 }

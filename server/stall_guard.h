@@ -5,24 +5,23 @@
 #include <memory>
 #include <optional>
 
-#include <grpcpp/server_context.h>
-
+#include "server/call_token.h"
 #include "server/timer.h"
 
 namespace halflight {
 
-// One operation at a time: a write, or a read. `context` outlives the guard, the timer both. A
+// One operation at a time: a write, or a read. The call outlives the guard, the timer both. A
 // limit of 0 never ends anything.
 class StallGuard {
  public:
-  StallGuard(Timer& timer, std::chrono::seconds limit, grpc::CallbackServerContext& context);
+  StallGuard(Timer& timer, std::chrono::seconds limit, CallToken& call);
   ~StallGuard();
   StallGuard(const StallGuard&) = delete;
   StallGuard& operator=(const StallGuard&) = delete;
   StallGuard(StallGuard&&) = delete;
   StallGuard& operator=(StallGuard&&) = delete;
 
-  // Right before the operation is started: the call is cancelled unless End comes within the limit.
+  // Right before the operation is started: the call is ended unless End comes within the limit.
   void Begin();
   // When it is done.
   void End();
