@@ -9,7 +9,7 @@ namespace halflight {
 
 class ByteBudget {
  public:
-  explicit ByteBudget(uint64_t total) : left_(total) {}
+  explicit ByteBudget(uint64_t total) : total_(total), left_(total) {}
 
   // A share of the budget, given back when it goes out of scope. Grows under one user only; the
   // budget must outlive it.
@@ -50,8 +50,10 @@ class ByteBudget {
   };
 
   [[nodiscard]] uint64_t left() const { return left_; }
+  [[nodiscard]] uint64_t used() const { return total_ - left_; }
 
  private:
+  const uint64_t total_;
   std::atomic<uint64_t> left_;
 };
 

@@ -7,8 +7,9 @@
 namespace halflight {
 
 struct Caller {
-  std::string tenant;  // "" where nothing says who it is
-  std::string peer;    // its address, as gRPC writes it
+  std::string tenant{};   // "" where nothing says who it is
+  std::string peer{};     // its address, as gRPC writes it
+  std::string call_id{};  // the name that the call is found by in the log
 
   // By whom shares are counted: the tenant, or the address without its port, since a client has
   // many.

@@ -37,6 +37,11 @@ ErrorDetail DetailOf(const absl::Status& status) {
   return detail;
 }
 
+std::string ReasonName(v1::ErrorReason reason) {
+  constexpr size_t kPrefix = std::char_traits<char>::length("ERROR_REASON_");
+  return v1::ErrorReason_Name(reason).substr(kPrefix);
+}
+
 absl::Status WithReason(absl::Status status, v1::ErrorReason reason) {
   status.SetPayload(kReasonPayload, absl::Cord(v1::ErrorReason_Name(reason)));
   return status;

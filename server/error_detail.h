@@ -22,6 +22,9 @@ struct ErrorDetail {
 // Of any error. Errors that name a field and no reason are of an invalid one.
 ErrorDetail DetailOf(const absl::Status& status);
 
+// As programs know it: without its prefix, such as "QUEUE_FULL".
+std::string ReasonName(v1::ErrorReason reason);
+
 absl::Status WithReason(absl::Status status, v1::ErrorReason reason);
 
 // FieldError of a value that is beyond one of ServerLimits.

@@ -1,83 +1,75 @@
 #include "server/frame_log.h"
 
 #include <algorithm>
-#include <iterator>
-#include <utility>
 
 #include <fmt/format.h>
 
 #include "server/convert/enums.h"
+#include "server/error_detail.h"
+#include "server/status_text.h"
 
 namespace halflight {
 namespace {
 
-// Between quotes, on one line, whatever a client wrote.
-std::string Quoted(absl::string_view text) {
-  std::string quoted = "\"";
-  for (const char c : text) {
-    if (c == '"' || c == '\\') {
-      quoted += '\\';
-    }
-    const auto byte = static_cast<unsigned char>(c);
-    quoted += byte < 0x20 || byte == 0x7f ? '?' : c;
+LogFields NameFields(const std::string& request_id, const Caller& caller) {
+  LogFields fields = {{"request_id", request_id}};
+  if (!caller.call_id.empty() && caller.call_id != request_id) {
+    fields.emplace_back("call_id", caller.call_id);
   }
-  return quoted + '"';
-}
-
-// Names of stages are for people; keys have no spaces.
-std::string Key(std::string stage) {
-  std::replace(stage.begin(), stage.end(), ' ', '_');
-  return stage;
-}
-
-void AppendCaller(std::string& line, const Caller& caller) {
-  for (const auto& [key, value] :
-       {std::pair("tenant", &caller.tenant), std::pair("peer", &caller.peer)}) {
-    if (!value->empty()) {
-      fmt::format_to(std::back_inserter(line), " {}={}", key, Quoted(*value));
-    }
+  if (!caller.tenant.empty()) {
+    fields.emplace_back("tenant", caller.tenant);
   }
+  if (!caller.peer.empty()) {
+    fields.emplace_back("peer", caller.peer);
+  }
+  return fields;
 }
 
-void AppendOutcome(std::string& line, const absl::Status& outcome) {
-  fmt::format_to(std::back_inserter(line), " outcome={}", absl::StatusCodeToString(outcome.code()));
+void AddOutcome(LogFields& fields, const absl::Status& outcome) {
+  fields.emplace_back("outcome", absl::StatusCodeToString(outcome.code()));
+  if (const auto reason = DetailOf(outcome).reason; reason != v1::ERROR_REASON_UNSPECIFIED) {
+    fields.emplace_back("reason", ReasonName(reason));
+  }
   if (!outcome.ok()) {
-    fmt::format_to(std::back_inserter(line), " message={}", Quoted(outcome.message()));
+    fields.emplace_back("message", MessageOf(outcome));
   }
 }
 
 }  // namespace
 
-std::string FrameLogLine(const FrameJob& job, const MadeFrame& frame, const absl::Status& outcome) {
-  const Scene& scene = job.request.scene;
-  std::string line = fmt::format("frame request_id={}", Quoted(job.request_id));
-  AppendCaller(line, job.caller);
-  fmt::format_to(std::back_inserter(line), " technique={} particles={} size={}x{} outputs={}",
-                 v1::ShadowTechnique_Name(ToProto(kTechniques, scene.shadow.technique)),
-                 scene.particles->size(), scene.camera.window.width, scene.camera.window.height,
-                 job.outputs.size());
-  for (const StageTiming& timing : frame.rendered.timings) {
-    fmt::format_to(std::back_inserter(line), " {}_ms={:.2f}", Key(timing.stage),
-                   timing.milliseconds);
-  }
-  if (frame.error.has_value()) {
-    fmt::format_to(std::back_inserter(line), " relative_rmse={:.4g}",
-                   frame.error->relative_rmse.value);
-  }
-  if (frame.target.has_value()) {
-    fmt::format_to(std::back_inserter(line), " attempts={} target_met={}",
-                   frame.target->attempts.size(), frame.target->met);
-  }
-  AppendOutcome(line, outcome);
-  return line;
+std::string StageKey(std::string stage) {
+  std::replace(stage.begin(), stage.end(), ' ', '_');
+  return stage;
 }
 
-std::string RefusalLogLine(const std::string& request_id, const Caller& caller,
-                           const absl::Status& outcome) {
-  std::string line = fmt::format("frame request_id={}", Quoted(request_id));
-  AppendCaller(line, caller);
-  AppendOutcome(line, outcome);
-  return line;
+LogFields FrameFields(const FrameJob& job, const MadeFrame& frame, const absl::Status& outcome) {
+  const Scene& scene = job.request.scene;
+  LogFields fields = NameFields(job.request_id, job.caller);
+  fields.emplace_back("technique",
+                      v1::ShadowTechnique_Name(ToProto(kTechniques, scene.shadow.technique)));
+  fields.emplace_back("particles", scene.particles->size());
+  fields.emplace_back("size",
+                      fmt::format("{}x{}", scene.camera.window.width, scene.camera.window.height));
+  fields.emplace_back("outputs", job.outputs.size());
+  for (const StageTiming& timing : frame.rendered.timings) {
+    fields.emplace_back(StageKey(timing.stage) + "_ms", timing.milliseconds);
+  }
+  if (frame.error.has_value()) {
+    fields.emplace_back("relative_rmse", frame.error->relative_rmse.value);
+  }
+  if (frame.target.has_value()) {
+    fields.emplace_back("attempts", frame.target->attempts.size());
+    fields.emplace_back("target_met", frame.target->met);
+  }
+  AddOutcome(fields, outcome);
+  return fields;
+}
+
+LogFields RefusedFrameFields(const std::string& request_id, const Caller& caller,
+                             const absl::Status& outcome) {
+  LogFields fields = NameFields(request_id, caller);
+  AddOutcome(fields, outcome);
+  return fields;
 }
 
 }  // namespace halflight

@@ -7,11 +7,12 @@
 #include <utility>
 
 #include <fmt/format.h>
-#include <spdlog/spdlog.h>
 
 #include "server/convert/describe.h"
 #include "server/error_detail.h"
 #include "server/frame_log.h"
+#include "server/log/log.h"
+#include "server/request_id.h"
 #include "server/status_text.h"
 
 namespace halflight {
@@ -144,8 +145,7 @@ absl::Status FramePipeline::Submit(FrameJob job, std::stop_token stop, Done done
     return status;
   }
   if (job.request_id.empty()) {
-    const std::lock_guard lock(mutex_);
-    job.request_id = fmt::format("server-{}", next_id_++);
+    job.request_id = MakeRequestId();
   }
   flight->job = std::move(job);
   flight->done = std::move(done);
@@ -172,6 +172,10 @@ uint32_t FramePipeline::queued() const {
   const std::lock_guard lock(mutex_);
   return queued_;
 }
+
+size_t FramePipeline::waiting() const { return queue_.waiting(); }
+
+uint64_t FramePipeline::memory_bytes() const { return frame_memory_->used(); }
 
 void FramePipeline::BeginSearch(const FlightPtr& flight) {
   flight->search.emplace(flight->job, costs_);
@@ -356,7 +360,9 @@ void FramePipeline::Complete(const FlightPtr& flight) {
     timings.push_back({"encode", Milliseconds(now - flight->encode_begin)});
   }
   timings.push_back({"total", Milliseconds(now - flight->submitted)});
-  spdlog::info(FrameLogLine(flight->job, flight->frame, flight->outcome));
+  Log(LogLevel::kInfo, "frame", FrameFields(flight->job, flight->frame, flight->outcome));
+  options_.metrics->OnFrame(flight->job.caller.tenant, flight->job.request.scene.shadow.technique,
+                            flight->outcome.code(), timings);
 
   absl::StatusOr<std::shared_ptr<const EncodedFrame>> answer = nullptr;
   if (flight->outcome.ok()) {

@@ -27,6 +27,7 @@
 #include "server/frame_queue.h"
 #include "server/frame_search.h"
 #include "server/made_frame.h"
+#include "server/metrics/metrics.h"
 #include "server/timer.h"
 #include "server/worker_pool.h"
 
@@ -51,6 +52,7 @@ struct PipelineOptions {
   // Whether to encode a small image of each kind of file at once, so that the first frame does not
   // wait for what the image library does the first time.
   bool warm_up = false;
+  Metrics* metrics = &Metrics::None();
   std::string server_version = "unknown";
   // What makes bytes of pixels; any thread.
   std::function<absl::StatusOr<EncodedImage>(const SharedImage&, ImageKind, LightQuantity,
@@ -87,6 +89,10 @@ class FramePipeline {
 
   // Frames accepted and not yet encoded. Any thread.
   [[nodiscard]] uint32_t queued() const;
+  // Frames that wait for the engine. Any thread.
+  [[nodiscard]] size_t waiting() const;
+  // What frames hold until they are sent. Any thread.
+  [[nodiscard]] uint64_t memory_bytes() const;
 
  private:
   struct Flight;
@@ -124,7 +130,6 @@ class FramePipeline {
   uint32_t queued_ = 0;                                  // counts against the limit
   std::unordered_map<std::string, uint32_t> queued_of_;  // by client; none at 0
   uint32_t flights_ = 0;                                 // until `done` has returned
-  uint64_t next_id_ = 0;
 
   WorkerPool workers_;
   // One: a measurement has all cores to itself, but for what renders and encodes meanwhile. Posts

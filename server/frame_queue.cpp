@@ -66,6 +66,15 @@ void FrameQueue::Push(QueuedFrame frame) {
   Advance();
 }
 
+size_t FrameQueue::waiting() const {
+  const std::lock_guard lock(mutex_);
+  size_t waiting = 0;
+  for (const auto& [name, client] : clients_) {
+    waiting += client.waiting.size();
+  }
+  return waiting;
+}
+
 void FrameQueue::OnStop(const std::weak_ptr<Entry>& stopped) {
   const EntryPtr entry = stopped.lock();
   if (entry == nullptr) {

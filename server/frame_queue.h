@@ -58,6 +58,9 @@ class FrameQueue {
   // thread.
   void Push(QueuedFrame frame);
 
+  // Frames that wait. Any thread.
+  [[nodiscard]] size_t waiting() const;
+
  private:
   enum class State : uint8_t { kNew, kWaiting, kTaken, kCancelled };
 
@@ -91,7 +94,7 @@ class FrameQueue {
   const int at_once_;
   const std::function<Clock::time_point()> now_;
 
-  std::mutex mutex_;
+  mutable std::mutex mutex_;
   std::condition_variable idle_;
   std::map<std::string, Client> clients_;
   std::chrono::duration<double> served_{0.0};  // `used` of the client whose turn was last

@@ -2,17 +2,19 @@
 
 #include <algorithm>
 #include <chrono>
+#include <mutex>
 #include <utility>
 
 #include <grpc/support/log.h>
+#include <grpcpp/ext/channelz_service_plugin.h>
 #include <grpcpp/ext/proto_server_reflection_plugin.h>
 #include <grpcpp/health_check_service_interface.h>
 #include <grpcpp/resource_quota.h>
 #include <grpcpp/server.h>
 #include <grpcpp/server_builder.h>
-#include <spdlog/spdlog.h>
 
-#include "server/listen/acceptor.h"
+#include "halflight/v1/service.grpc.pb.h"
+#include "server/log/log.h"
 #include "server/render_service.h"
 
 namespace halflight {
@@ -23,11 +25,8 @@ constexpr std::chrono::milliseconds kShutdownGrace{200};
 
 // gRPC's own complaints belong in the same log, in the same form.
 void ForwardLog(gpr_log_func_args* line) {
-  if (line->severity == GPR_LOG_SEVERITY_ERROR) {
-    spdlog::warn("grpc message=\"{}\"", line->message);
-  } else {
-    spdlog::debug("grpc message=\"{}\"", line->message);
-  }
+  Log(line->severity == GPR_LOG_SEVERITY_ERROR ? LogLevel::kWarn : LogLevel::kDebug, "grpc",
+      {{"message", line->message}});
 }
 
 // Reflection is served by threads of gRPC's, one a stream: so many at once, and more are refused.
@@ -55,16 +54,33 @@ struct GrpcServer::Parts {
   std::unique_ptr<grpc::Server> server;
   std::unique_ptr<grpc::experimental::ExternalConnectionAcceptor> to_server;
   std::unique_ptr<Acceptor> acceptor;
+  std::mutex health_mutex;
+  bool serving = true;
+  bool draining = false;
+
+  // Under the mutex.
+  void TellHealth() { server->GetHealthCheckService()->SetServingStatus(serving && !draining); }
 };
 
 GrpcServer::GrpcServer(std::unique_ptr<Parts> parts) : parts_(std::move(parts)) {}
 
 absl::StatusOr<std::unique_ptr<GrpcServer>> GrpcServer::Start(std::vector<ListeningSocket> sockets,
                                                               const Access& access,
-                                                              const Backend& backend) {
+                                                              const Backend& backend,
+                                                              const GrpcServerOptions& options) {
   gpr_set_log_function(ForwardLog);
   grpc::EnableDefaultHealthCheckService(true);
   grpc::reflection::InitProtoReflectionServerBuilderPlugin();
+  if (options.channelz) {
+    for (const ListeningSocket& socket : sockets) {
+      if (!socket.local()) {
+        Log(LogLevel::kWarn, "insecure_channelz",
+            {{"address", socket.address()},
+             {"message", "others than this machine can see who is connected"}});
+      }
+    }
+    grpc::channelz::experimental::InitChannelzService();
+  }
 
   auto parts = std::make_unique<Parts>(backend, access);
   grpc::ServerBuilder builder;
@@ -77,6 +93,8 @@ absl::StatusOr<std::unique_ptr<GrpcServer>> GrpcServer::Start(std::vector<Listen
   if (parts->server == nullptr) {
     return absl::InternalError("gRPC could not start its server");
   }
+  parts->server->GetHealthCheckService()->SetServingStatus(v1::RenderService::service_full_name(),
+                                                           true);
   // The constructor is private. From here on the destructor shuts down.
   std::unique_ptr<GrpcServer> started(new GrpcServer(std::move(parts)));
   for (const ListeningSocket& socket : sockets) {
@@ -115,13 +133,32 @@ GrpcServer::~GrpcServer() {
   parts_->server->Wait();
 }
 
+void GrpcServer::SetServing(bool serving) {
+  const std::lock_guard lock(parts_->health_mutex);
+  parts_->serving = serving;
+  parts_->TellHealth();
+}
+
+bool GrpcServer::serving() const {
+  const std::lock_guard lock(parts_->health_mutex);
+  return parts_->serving && !parts_->draining;
+}
+
 void GrpcServer::BeginDrain() {
-  parts_->server->GetHealthCheckService()->SetServingStatus(false);
+  {
+    const std::lock_guard lock(parts_->health_mutex);
+    parts_->draining = true;
+    parts_->TellHealth();
+  }
   parts_->service.BeginDrain();
   parts_->acceptor->Stop();
 }
 
 bool GrpcServer::idle() const { return parts_->service.active_calls() == 0; }
+
+int GrpcServer::calls(Rpc rpc) const { return parts_->service.active_calls(rpc); }
+
+ConnectionCounts GrpcServer::connections() const { return parts_->acceptor->counts(); }
 
 uint64_t GrpcServer::calls_begun() const { return parts_->service.calls_begun(); }
 

@@ -10,9 +10,16 @@
 #include "absl/status/statusor.h"
 #include "server/access/access.h"
 #include "server/handlers/backend.h"
+#include "server/listen/acceptor.h"
 #include "server/listen/listening_socket.h"
 
 namespace halflight {
+
+struct GrpcServerOptions {
+  // Whether to serve channelz, which tells everybody who can connect of calls, connections and
+  // their peers' addresses. Once in a process, for all servers from then on.
+  bool channelz = false;
+};
 
 class GrpcServer {
  public:
@@ -22,7 +29,8 @@ class GrpcServer {
   // process waits for before: the server's threads inherit the mask.
   static absl::StatusOr<std::unique_ptr<GrpcServer>> Start(std::vector<ListeningSocket> sockets,
                                                            const Access& access,
-                                                           const Backend& backend);
+                                                           const Backend& backend,
+                                                           const GrpcServerOptions& options = {});
   // The same with new sockets ("host:port" or "unix:path"), for everybody who can reach them.
   static absl::StatusOr<std::unique_ptr<GrpcServer>> Start(
       const std::vector<std::string>& addresses, const Backend& backend);
@@ -37,11 +45,19 @@ class GrpcServer {
   // The addresses with the ports that were taken for 0.
   [[nodiscard]] const std::vector<std::string>& addresses() const { return addresses_; }
 
+  // What health says, of the server as a whole ("") and of halflight.v1.RenderService: true from
+  // the start on. After BeginDrain it stays false. Any thread.
+  void SetServing(bool serving);
+  [[nodiscard]] bool serving() const;
+
   // Health turns to NOT_SERVING, then nobody can connect any more and new calls are refused with
   // UNAVAILABLE; calls under way go on. Socket files are removed.
   void BeginDrain();
   // Whether no call is under way.
   [[nodiscard]] bool idle() const;
+  // Of one RPC.
+  [[nodiscard]] int calls(Rpc rpc) const;
+  [[nodiscard]] ConnectionCounts connections() const;
   // Calls that ever began.
   [[nodiscard]] uint64_t calls_begun() const;
 

@@ -10,15 +10,16 @@
 #include <utility>
 #include <vector>
 
-#include <spdlog/sinks/stdout_sinks.h>
-#include <spdlog/spdlog.h>
-
 #include "renderer/kept_memory.h"
 #include "renderer/render_thread.h"
 #include "server/access/access.h"
 #include "server/grpc_server.h"
 #include "server/listen/acceptor.h"
 #include "server/listen/listening_socket.h"
+#include "server/log/log.h"
+#include "server/metrics/metrics_page.h"
+#include "server/metrics/metrics_server.h"
+#include "server/metrics/prometheus_metrics.h"
 #include "server/options.h"
 #include "server/particle_files.h"
 #include "server/service_manager.h"
@@ -53,12 +54,14 @@ int Fail(int code, const absl::Status& status) {
   return code;
 }
 
-PipelineOptions PipelineOptionsOf(const Options& options, const ServerLimits& limits) {
+PipelineOptions PipelineOptionsOf(const Options& options, const ServerLimits& limits,
+                                  Metrics& metrics) {
   PipelineOptions pipeline{.max_queued_frames = limits.max_queued_frames,
                            .max_client_frames = limits.max_client_frames,
                            .max_frame_bytes = limits.max_frame_bytes,
                            .encode_threads = options.encode_threads,
                            .warm_up = true,
+                           .metrics = &metrics,
                            .server_version = kVersion};
   if (limits.max_frame_seconds > 0) {
     pipeline.max_frame_time = std::chrono::seconds(limits.max_frame_seconds);
@@ -84,6 +87,12 @@ int Run(const Options& options, std::vector<ListeningSocket> inherited, const si
       !status.ok()) {
     return Fail(kExitBadFlags, status);
   }
+  auto metrics_sockets = BindMetricsAddress(options.metrics);
+  if (!metrics_sockets.ok()) {
+    return Fail(
+        absl::IsInvalidArgument(metrics_sockets.status()) ? kExitBadFlags : kExitCannotStart,
+        metrics_sockets.status());
+  }
 
   auto engine =
       StartRenderThread({.device = options.device,
@@ -97,15 +106,19 @@ int Run(const Options& options, std::vector<ListeningSocket> inherited, const si
     return Fail(kExitCannotStart, engine.status());
   }
   const DeviceInfo& device = (*engine)->device();
-  spdlog::info("device renderer=\"{}\" gl=\"{}\" software={} tells_of_resets={}",
-               device.gl_renderer, device.gl_version, device.software, device.tells_of_resets);
+  Log(LogLevel::kInfo, "device",
+      {{"renderer", device.gl_renderer},
+       {"gl", device.gl_version},
+       {"software", device.software},
+       {"tells_of_resets", device.tells_of_resets}});
 
   // Each uses those above it, and is gone before them.
   ServerLimits limits = LimitsOnDevice(options.limits, device);
   limits.max_connections = std::min(limits.max_connections, RoomForConnections());
   if (limits.max_connections < options.limits.max_connections) {
-    spdlog::warn("fewer connections than --max-connections, for want of open files max={}",
-                 limits.max_connections);
+    Log(LogLevel::kWarn, "fewer_connections",
+        {{"max", limits.max_connections},
+         {"message", "than --max-connections, for want of open files"}});
   }
   const std::string version = kVersion;
   std::unique_ptr<ParticleFiles> files;
@@ -121,14 +134,21 @@ int Run(const Options& options, std::vector<ListeningSocket> inherited, const si
   PartialUploads partial_uploads(upload_memory,
                                  {.max_count = limits.max_partial_uploads,
                                   .max_age = std::chrono::seconds(limits.partial_upload_seconds)});
-  FramePipeline pipeline(**engine, PipelineOptionsOf(options, limits));
-  auto server = GrpcServer::Start(*std::move(sockets), **access,
-                                  {device, limits, version, store, partial_uploads, pipeline});
+  PrometheusMetrics counted;
+  Metrics& metrics = metrics_sockets->empty() ? Metrics::None() : counted;
+  FramePipeline pipeline(**engine, PipelineOptionsOf(options, limits, metrics));
+  const Backend backend{device, limits, version, store, partial_uploads, pipeline, metrics};
+  auto server =
+      GrpcServer::Start(*std::move(sockets), **access, backend, {.channelz = options.channelz});
   if (!server.ok()) {
     return Fail(kExitCannotStart, server.status());
   }
+  auto shown = ShowMetrics(*std::move(metrics_sockets), counted, {**engine, backend, **server});
+  if (!shown.ok()) {
+    return Fail(kExitCannotStart, shown.status());
+  }
   for (const std::string& address : (*server)->addresses()) {
-    spdlog::info("listening address={}", address);
+    Log(LogLevel::kInfo, "listening", {{"address", address}});
   }
   NotifyServiceManager("READY=1");
 
@@ -141,13 +161,15 @@ int Run(const Options& options, std::vector<ListeningSocket> inherited, const si
     supervision.Drain(kAfterDeviceLost);
     std::_Exit(kExitDeviceLost);
   }
-  spdlog::info("draining signal={} drain_seconds={}", *signal, options.drain_seconds);
+  Log(LogLevel::kInfo, "draining",
+      {{"signal", *signal}, {"drain_seconds", options.drain_seconds}});
   if (!supervision.Drain(std::chrono::seconds(options.drain_seconds))) {
     // At once: what runs may be stuck, so nothing is waited for.
-    spdlog::error("stopped before the calls under way were finished");
+    Log(LogLevel::kError, "cut_short",
+        {{"message", "stopped before the calls under way were finished"}});
     std::_Exit(kExitCutShort);
   }
-  spdlog::info("stopped");
+  Log(LogLevel::kInfo, "stopped");
   return EXIT_SUCCESS;
 }
 
@@ -170,9 +192,6 @@ int main(int argc, char** argv) {
   }
   // Before any thread is made: all of them inherit the mask.
   const sigset_t signals = BlockTerminationSignals();
-  spdlog::set_default_logger(spdlog::stderr_logger_mt("halflightd"));
-  spdlog::set_level(spdlog::level::from_str((*options)->log_level));
-  spdlog::set_pattern("%Y-%m-%dT%H:%M:%S.%e%z level=%l %v");
-  spdlog::flush_on(spdlog::level::info);
+  StartLog((*options)->log_level, (*options)->log_format);
   return Run(**options, *std::move(inherited), signals);
 }

@@ -37,8 +37,6 @@ void AddFlags(CLI::App& app, Options& options) {
                  "What to render on: auto, software, uuid:<32 hex digits>, cuda:<index> or "
                  "drm:<path>")
       ->capture_default_str();
-  app.add_option("--log-level", options.log_level, fmt::format("One of {}", kLogLevels))
-      ->capture_default_str();
   app.add_option("--encode-threads", options.encode_threads,
                  "Threads that encode images; 0: one for each core but one");
   app.add_option("--drain-seconds", options.drain_seconds,
@@ -59,6 +57,34 @@ void AddFlags(CLI::App& app, Options& options) {
            options.faults = std::make_shared<PlannedFaults>(*std::move(faults));
          })
       ->group("");
+}
+
+void AddObservabilityFlags(CLI::App& app, Options& options) {
+  const char* const group = "Observability";
+  app.add_option("--log-level", options.log_level, fmt::format("One of {}", kLogLevels))
+      ->capture_default_str()
+      ->group(group);
+  app.add_option_function<std::string>(
+         "--log-format",
+         [&options](const std::string& format) {
+           options.log_format = format == "json" ? LogFormat::kJson : LogFormat::kText;
+         },
+         "Of the lines on stderr: text (key=value) or json")
+      ->check(CLI::IsMember({"text", "json"}))
+      ->default_str("text")
+      ->group(group);
+  app.add_option("--metrics-address", options.metrics.address,
+                 "Where to show metrics to Prometheus, as http://<address>/metrics: host:port or "
+                 "unix:path. Unset: nowhere")
+      ->type_name("ADDRESS")
+      ->group(group);
+  app.add_flag("--insecure-metrics", options.metrics.insecure,
+               "Show metrics also where others than this machine can connect")
+      ->group(group);
+  app.add_flag("--channelz", options.channelz,
+               "Serve grpc.channelz.v1, which tells everybody who can connect of calls, "
+               "connections and their peers' addresses")
+      ->group(group);
 }
 
 void AddAccessFlags(CLI::App& app, AccessOptions& access) {
@@ -153,13 +179,13 @@ void AddLimitFlags(CLI::App& app, Options& options) {
          "Of a connection without a call, before it is closed");
 }
 
-void CheckAddress(const std::string& address, FieldChecks& checks) {
+void CheckAddress(const char* flag, const std::string& address, FieldChecks& checks) {
   const std::string allowed = fmt::format(
       "host:port with a port from 0 to 65535, or unix:path of at most {} bytes", kMaxSocketPath);
   if (address.rfind("unix:", 0) == 0) {
     const size_t length = address.size() - std::strlen("unix:");
     if (length == 0 || length > kMaxSocketPath) {
-      checks.Reject("--address", address, allowed);
+      checks.Reject(flag, address, allowed);
     }
     return;
   }
@@ -167,13 +193,13 @@ void CheckAddress(const std::string& address, FieldChecks& checks) {
   int port = -1;
   if (colon == std::string::npos || colon == 0 ||
       !absl::SimpleAtoi(address.substr(colon + 1), &port) || port < 0 || port > kMaxPort) {
-    checks.Reject("--address", address, allowed);
+    checks.Reject(flag, address, allowed);
   }
 }
 
 void CheckAddresses(const std::vector<std::string>& addresses, FieldChecks& checks) {
   for (const std::string& address : addresses) {
-    CheckAddress(address, checks);
+    CheckAddress("--address", address, checks);
     const bool fixed = address.size() < 2 || address.compare(address.size() - 2, 2, ":0") != 0;
     if (fixed && std::count(addresses.begin(), addresses.end(), address) > 1) {
       checks.Reject("--address", address + " twice", "each address once");
@@ -195,6 +221,9 @@ absl::Status Check(const Options& options) {
   FieldChecks checks;
   CheckAddresses(options.addresses, checks);
   CheckTls(options.access.tls, checks);
+  if (!options.metrics.address.empty()) {
+    CheckAddress("--metrics-address", options.metrics.address, checks);
+  }
   const std::vector<std::string> levels = {"trace", "debug", "info", "warn", "error", "off"};
   if (std::find(levels.begin(), levels.end(), options.log_level) == levels.end()) {
     checks.Reject("--log-level", options.log_level, kLogLevels);
@@ -268,6 +297,7 @@ absl::StatusOr<std::optional<Options>> ParseOptions(int argc, const char* const*
   CLI::App app("halflightd: renders particle clouds for clients over gRPC", "halflightd");
   app.set_version_flag("--version", std::string("halflightd ") + kVersion);
   AddFlags(app, options);
+  AddObservabilityFlags(app, options);
   AddAccessFlags(app, options.access);
   AddLimitFlags(app, options);
   const CLI::Option* const config =

@@ -11,6 +11,8 @@
 #include "renderer/device_fault.h"
 #include "server/access/access.h"
 #include "server/limits.h"
+#include "server/log/log.h"
+#include "server/metrics/metrics_server.h"
 
 namespace halflight {
 
@@ -24,6 +26,9 @@ struct Options {
   std::string device = "auto";  // as in RenderThreadOptions
   ServerLimits limits;
   std::string log_level = "info";
+  LogFormat log_format = LogFormat::kText;
+  MetricsOptions metrics;
+  bool channelz = false;   // as in GrpcServerOptions
   int encode_threads = 0;  // filled in: one for each core, less the one that renders
   int drain_seconds = 30;
   int watchdog_seconds = 60;              // 0: a device that hangs is not noticed

@@ -97,4 +97,9 @@ void PartialUploads::DropExpired() {
   Expire(dropped);
 }
 
+size_t PartialUploads::count() const {
+  const std::lock_guard lock(mutex_);
+  return kept_.size();
+}
+
 }  // namespace halflight

@@ -66,6 +66,9 @@ class PartialUploads {
   // asks.
   void DropExpired();
 
+  // Uploads that are kept.
+  [[nodiscard]] size_t count() const;
+
  private:
   struct Entry {
     std::unique_ptr<PartialUpload> upload;
@@ -80,7 +83,7 @@ class PartialUploads {
 
   ByteBudget& memory_;
   const PartialUploadOptions options_;
-  std::mutex mutex_;
+  mutable std::mutex mutex_;
   Entries kept_;  // the last that broke off first
 };
 

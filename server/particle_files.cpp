@@ -14,10 +14,10 @@
 #include <sys/stat.h>
 
 #include <fmt/format.h>
-#include <spdlog/spdlog.h>
 
 #include "absl/strings/escaping.h"
 #include "halflight/sha256.h"
+#include "server/log/log.h"
 #include "server/particle_file.h"
 #include "server/status_text.h"
 
@@ -32,6 +32,11 @@ constexpr char kTemporarySuffix[] = ".particles.writing";
 uint64_t BlockBytes(uint64_t bytes) {
   constexpr uint64_t kBlock = 4096;
   return (bytes + kBlock - 1) / kBlock * kBlock;
+}
+
+// The set stays in memory only.
+void LogNotWritten(const std::string& sha256, const std::string& why) {
+  Log(LogLevel::kWarn, "cache_dir_not_written", {{"set", ToHex(sha256)}, {"message", why}});
 }
 
 std::string FileName(const std::string& sha256) { return ToHex(sha256) + kSuffix; }
@@ -149,9 +154,10 @@ absl::Status ParticleFiles::Scan() {
   }
   MakeRoom(0);
   if (others > 0) {
-    spdlog::warn("cache-dir path=\"{}\" other_files={} left alone", path_, others);
+    Log(LogLevel::kWarn, "cache_dir_others",
+        {{"path", path_}, {"files", others}, {"message", "left alone"}});
   }
-  spdlog::info("cache-dir path=\"{}\" sets={} bytes={}", path_, by_use_.size(), bytes_);
+  Log(LogLevel::kInfo, "cache_dir", {{"path", path_}, {"sets", by_use_.size()}, {"bytes", bytes_}});
   return absl::OkStatus();
 }
 
@@ -204,7 +210,7 @@ void ParticleFiles::Write(const std::string& sha256, std::shared_ptr<const Parti
     }
   }
   if (refusal != nullptr) {
-    spdlog::warn("cache-dir set={} is in memory only: {}", ToHex(sha256), refusal);
+    LogNotWritten(sha256, refusal);
     return;
   }
   writer_.Post([this, sha256, set = std::move(set)] { WriteNow(sha256, set); });
@@ -222,7 +228,7 @@ void ParticleFiles::WriteNow(const std::string& sha256,
     status = WriteFile(sha256, *set);
   }
   if (!status.ok()) {
-    spdlog::warn("cache-dir set={} is in memory only: {}", ToHex(sha256), MessageOf(status));
+    LogNotWritten(sha256, MessageOf(status));
   }
   const std::lock_guard lock(mutex_);
   waiting_.erase(sha256);
@@ -326,8 +332,10 @@ std::shared_ptr<const ParticleSet> ParticleFiles::ReadFile(const std::string& sh
     });
   }
   if (was_here) {
-    spdlog::warn("cache-dir set={} is missing now: {}{}", ToHex(sha256), MessageOf(status),
-                 absl::IsDataLoss(status) ? "; its file is removed" : "");
+    Log(LogLevel::kWarn, "cache_dir_set_missing",
+        {{"set", ToHex(sha256)},
+         {"file_removed", absl::IsDataLoss(status)},
+         {"message", MessageOf(status)}});
   }
   return nullptr;
 }
@@ -372,6 +380,11 @@ bool ParticleFiles::idle() const {
 uint64_t ParticleFiles::bytes() const {
   const std::lock_guard lock(mutex_);
   return bytes_;
+}
+
+size_t ParticleFiles::sets() const {
+  const std::lock_guard lock(mutex_);
+  return by_use_.size();
 }
 
 }  // namespace halflight

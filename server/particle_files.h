@@ -66,6 +66,7 @@ class ParticleFiles {
   [[nodiscard]] bool idle() const;
   // Of all files that are written, each counted in blocks.
   [[nodiscard]] uint64_t bytes() const;
+  [[nodiscard]] size_t sets() const;
 
  private:
   struct File {

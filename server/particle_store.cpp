@@ -21,6 +21,12 @@ ParticleStore::ParticleStore(uint64_t max_bytes, std::unique_ptr<ParticleFiles> 
 ParticleStore::~ParticleStore() = default;
 
 std::shared_ptr<const ParticleSet> ParticleStore::Find(const std::string& sha256) {
+  auto set = Use(sha256);
+  ++(set != nullptr ? hits_ : misses_);
+  return set;
+}
+
+std::shared_ptr<const ParticleSet> ParticleStore::Use(const std::string& sha256) {
   const std::lock_guard lock(mutex_);
   const auto found = by_name_.find(sha256);
   if (found == by_name_.end()) {
@@ -34,7 +40,7 @@ std::shared_ptr<const ParticleSet> ParticleStore::Find(const std::string& sha256
 }
 
 bool ParticleStore::Touch(const std::string& sha256) {
-  return Find(sha256) != nullptr || (files_ != nullptr && files_->Use(sha256));
+  return Use(sha256) != nullptr || (files_ != nullptr && files_->Use(sha256));
 }
 
 bool ParticleStore::InMemory(const std::string& sha256) const {
@@ -49,6 +55,7 @@ bool ParticleStore::OnDiskOnly(const std::string& sha256) {
 void ParticleStore::Fetch(const std::string& sha256, std::stop_token stop,
                           std::function<void()> then) {
   files_->Read(sha256, std::move(stop), [this, sha256, then = std::move(then)](const auto& set) {
+    ++(set != nullptr ? disk_reads_ : failed_disk_reads_);
     if (set != nullptr) {
       Keep(sha256, set);
     }
@@ -85,6 +92,21 @@ void ParticleStore::Keep(const std::string& sha256, std::shared_ptr<const Partic
   by_use_.push_front({sha256, std::move(set), bytes});
   by_name_[sha256] = by_use_.begin();
   bytes_ += bytes;
+}
+
+ParticleStore::State ParticleStore::state() const {
+  State state{.hits = hits_,
+              .misses = misses_,
+              .disk_reads = disk_reads_,
+              .failed_disk_reads = failed_disk_reads_};
+  if (files_ != nullptr) {
+    state.disk_bytes = files_->bytes();
+    state.disk_sets = files_->sets();
+  }
+  const std::lock_guard lock(mutex_);
+  state.bytes = bytes_;
+  state.sets = by_use_.size();
+  return state;
 }
 
 uint64_t ParticleStore::bytes() const {

@@ -3,6 +3,7 @@
 // sets arrive or what is in them.
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <functional>
 #include <list>
@@ -57,6 +58,17 @@ class ParticleStore {
   // larger than the whole store is not kept. On disk it is a little later.
   void Insert(const std::string& sha256, std::shared_ptr<const ParticleSet> set);
 
+  struct State {
+    uint64_t bytes = 0;  // in memory
+    uint64_t sets = 0;
+    uint64_t hits = 0;  // what Find has come to so far
+    uint64_t misses = 0;
+    uint64_t disk_bytes = 0;  // in the cache directory
+    uint64_t disk_sets = 0;
+    uint64_t disk_reads = 0;  // what Fetch has come to so far
+    uint64_t failed_disk_reads = 0;
+  };
+  [[nodiscard]] State state() const;
   // In memory.
   [[nodiscard]] uint64_t bytes() const;
   // Whether nothing waits to be written to disk.
@@ -70,11 +82,17 @@ class ParticleStore {
   };
 
   bool InMemory(const std::string& sha256) const;
+  // Find without counting.
+  std::shared_ptr<const ParticleSet> Use(const std::string& sha256);
   void Keep(const std::string& sha256, std::shared_ptr<const ParticleSet> set);
 
   const uint64_t max_bytes_;
   mutable std::mutex mutex_;
   uint64_t bytes_ = 0;
+  std::atomic<uint64_t> hits_ = 0;
+  std::atomic<uint64_t> misses_ = 0;
+  std::atomic<uint64_t> disk_reads_ = 0;
+  std::atomic<uint64_t> failed_disk_reads_ = 0;
   std::list<Entry> by_use_;  // most recently used first
   std::unordered_map<std::string, std::list<Entry>::iterator> by_name_;
   std::unique_ptr<ParticleFiles> files_;  // last: its threads use all of the above

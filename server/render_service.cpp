@@ -1,18 +1,13 @@
 #include "server/render_service.h"
 
-#include <atomic>
 #include <chrono>
 #include <functional>
 #include <optional>
 #include <utility>
 
-#include <fmt/format.h>
-#include <spdlog/spdlog.h>
-
 #include "absl/status/status.h"
 #include "halflight/v1/service.grpc.pb.h"
-#include "server/caller.h"
-#include "server/error_detail.h"
+#include "server/call_token.h"
 #include "server/handlers/find_missing_particles.h"
 #include "server/handlers/get_server_info.h"
 #include "server/handlers/query_upload.h"
@@ -21,7 +16,6 @@
 #include "server/handlers/upload_particles.h"
 #include "server/message_buffer.h"
 #include "server/stall_guard.h"
-#include "server/status_to_grpc.h"
 
 // The callback API deletes a reactor in OnDone, which comes after Finish and after every reaction
 // has returned. So a reactor never touches itself after Finish other than by returning, and
@@ -32,57 +26,6 @@ namespace halflight {
 namespace {
 
 using grpc::CallbackServerContext;
-
-// How many calls are under way, and whether more may come.
-struct CallCount {
-  std::atomic<int> active = 0;
-  std::atomic<uint64_t> begun = 0;
-  std::atomic<bool> draining = false;
-};
-
-// One call under way, and whose it is. Counted before draining is looked at, so that whoever drains
-// and then sees no calls can be sure that none slips in.
-class CallToken {
- public:
-  CallToken(CallCount& count, const ServerLimits& limits, const Access& access,
-            const CallbackServerContext& context)
-      : count_(count) {
-    ++count_.begun;
-    if (++count_.active > static_cast<int64_t>(limits.max_calls)) {
-      refusal_ = BusyError(v1::ERROR_REASON_TOO_MANY_CALLS,
-                           fmt::format("{} calls are under way, allowed: at most {}: retry later",
-                                       count_.active - 1, limits.max_calls));
-      return;
-    }
-    if (count_.draining) {
-      refusal_ = WithReason(
-          absl::UnavailableError("the server is shutting down: retry elsewhere or later"),
-          v1::ERROR_REASON_DRAINING);
-      return;
-    }
-    auto caller = access.Identify(context);
-    if (caller.ok()) {
-      caller_ = *std::move(caller);
-    } else {
-      refusal_ = WithReason(caller.status(), v1::ERROR_REASON_UNAUTHENTICATED);
-    }
-  }
-  ~CallToken() { --count_.active; }
-  CallToken(const CallToken&) = delete;
-  CallToken& operator=(const CallToken&) = delete;
-  CallToken(CallToken&&) = delete;
-  CallToken& operator=(CallToken&&) = delete;
-
-  // Why the call is not served, or OK.
-  [[nodiscard]] const absl::Status& refusal() const { return refusal_; }
-  // Nobody where it is refused.
-  [[nodiscard]] const Caller& caller() const { return caller_; }
-
- private:
-  CallCount& count_;
-  absl::Status refusal_;
-  Caller caller_;
-};
 
 // What all calls of a service share.
 struct Shared {
@@ -100,21 +43,17 @@ std::chrono::seconds StallLimit(const Backend& backend) {
 }
 
 // What becomes of a call whose peer stalls.
-std::function<void()> Cancelling(const Backend& backend, CallbackServerContext& context) {
-  return [&context, seconds = backend.limits.max_stall_seconds] {
-    spdlog::warn("call stalled peer={} seconds={}", context.peer(), seconds);
-    context.TryCancel();
-  };
+std::function<void()> EndForStall(CallToken& token, const Backend& backend) {
+  return [&token, limit = StallLimit(backend)] { token.EndForStall(limit); };
 }
 
 class UploadCall final : public grpc::ServerReadReactor<v1::UploadParticlesRequest> {
  public:
   UploadCall(Shared& shared, CallbackServerContext& context, v1::UploadParticlesResponse& response)
-      : token_(shared.count, shared.backend.limits, shared.access, context),
-        context_(context),
+      : token_(Rpc::kUploadParticles, shared.count, shared.backend, shared.access, context),
         response_(response),
         handler_(shared.backend),
-        stall_(shared.timer, StallLimit(shared.backend), Cancelling(shared.backend, context)) {
+        stall_(shared.timer, StallLimit(shared.backend), EndForStall(token_, shared.backend)) {
     if (!token_.refusal().ok()) {
       Answer(token_.refusal());
     } else {
@@ -128,6 +67,7 @@ class UploadCall final : public grpc::ServerReadReactor<v1::UploadParticlesReque
       Answer(handler_.OnEndOfRequests());
       return;
     }
+    token_.OnReceived(request_.ByteSizeLong());
     if (const auto answer = handler_.OnRequest(request_)) {
       Answer(*answer);
     } else {
@@ -147,11 +87,10 @@ class UploadCall final : public grpc::ServerReadReactor<v1::UploadParticlesReque
     if (answer.ok()) {
       response_ = *answer;
     }
-    Finish(ToGrpc(answer.status(), context_));
+    Finish(token_.End(answer.status()));
   }
 
-  const CallToken token_;
-  CallbackServerContext& context_;
+  CallToken token_;
   v1::UploadParticlesResponse& response_;
   UploadParticlesHandler handler_;
   StallGuard stall_;
@@ -160,8 +99,12 @@ class UploadCall final : public grpc::ServerReadReactor<v1::UploadParticlesReque
 
 // What sends frames takes messages in bytes, so that chunks need not be copied into messages first.
 template <typename Message>
-bool Parse(grpc::ByteBuffer bytes, Message& message) {
-  return grpc::SerializationTraits<Message>::Deserialize(&bytes, &message).ok();
+std::optional<Message> Parse(grpc::ByteBuffer bytes) {
+  Message message;
+  if (!grpc::SerializationTraits<Message>::Deserialize(&bytes, &message).ok()) {
+    return std::nullopt;
+  }
+  return message;
 }
 
 class RenderFrameCall final : public grpc::ServerWriteReactor<grpc::ByteBuffer>,
@@ -170,22 +113,25 @@ class RenderFrameCall final : public grpc::ServerWriteReactor<grpc::ByteBuffer>,
 
  public:
   RenderFrameCall(Shared& shared, CallbackServerContext& context, const grpc::ByteBuffer& request)
-      : token_(shared.count, shared.backend.limits, shared.access, context),
-        context_(context),
-        stall_(shared.timer, StallLimit(shared.backend), Cancelling(shared.backend, context)),
+      : request_(Parse<v1::RenderFrameRequest>(request)),
+        token_(Rpc::kRenderFrame, shared.count, shared.backend, shared.access, context,
+               request_.has_value() ? request_->request_id() : ""),
+        stall_(shared.timer, StallLimit(shared.backend), EndForStall(token_, shared.backend)),
         handler_(std::make_shared<RenderFrameHandler>(shared.backend, *this, token_.caller())) {
-    if (v1::RenderFrameRequest message; !token_.refusal().ok()) {
+    token_.OnReceived(request.Length());
+    if (!token_.refusal().ok()) {
       RenderFrameCall::Finish(token_.refusal());
-    } else if (!Parse(request, message)) {
+    } else if (!request_.has_value()) {
       RenderFrameCall::Finish(
           absl::InvalidArgumentError("the message is not a RenderFrameRequest"));
     } else {
-      handler_->Start(message);
+      handler_->Start(*std::exchange(request_, std::nullopt));
     }
   }
 
   void OnWriteDone(bool ok) override {
     stall_.End();
+    token_.OnSent(ok ? response_.Length() : 0);
     handler_->OnWritten(ok);
   }
   void OnCancel() override { handler_->OnCancel(); }
@@ -197,10 +143,10 @@ class RenderFrameCall final : public grpc::ServerWriteReactor<grpc::ByteBuffer>,
     stall_.Begin();
     StartWrite(&response_);
   }
-  void Finish(const absl::Status& status) override { Reactor::Finish(ToGrpc(status, context_)); }
+  void Finish(const absl::Status& status) override { Reactor::Finish(token_.End(status)); }
 
-  const CallToken token_;
-  CallbackServerContext& context_;
+  std::optional<v1::RenderFrameRequest> request_;  // until the call begins
+  CallToken token_;
   StallGuard stall_;
   const std::shared_ptr<RenderFrameHandler> handler_;
   grpc::ByteBuffer response_;
@@ -212,9 +158,8 @@ class RenderSequenceCall final : public grpc::ServerBidiReactor<grpc::ByteBuffer
 
  public:
   RenderSequenceCall(Shared& shared, CallbackServerContext& context)
-      : token_(shared.count, shared.backend.limits, shared.access, context),
-        context_(context),
-        stall_(shared.timer, StallLimit(shared.backend), Cancelling(shared.backend, context)),
+      : token_(Rpc::kRenderSequence, shared.count, shared.backend, shared.access, context),
+        stall_(shared.timer, StallLimit(shared.backend), EndForStall(token_, shared.backend)),
         handler_(std::make_shared<RenderSequenceHandler>(shared.backend, *this, token_.caller())) {
     if (!token_.refusal().ok()) {
       RenderSequenceCall::Finish(token_.refusal());
@@ -224,16 +169,20 @@ class RenderSequenceCall final : public grpc::ServerBidiReactor<grpc::ByteBuffer
   }
 
   void OnReadDone(bool ok) override {
-    if (v1::RenderSequenceRequest message; !ok) {
+    if (!ok) {
       handler_->OnEndOfRequests();
-    } else if (!Parse(request_, message)) {
-      handler_->OnUnreadableRequest();
+      return;
+    }
+    token_.OnReceived(request_.Length());
+    if (const auto message = Parse<v1::RenderSequenceRequest>(request_)) {
+      handler_->OnRequest(*message);
     } else {
-      handler_->OnRequest(message);
+      handler_->OnUnreadableRequest();
     }
   }
   void OnWriteDone(bool ok) override {
     stall_.End();
+    token_.OnSent(ok ? response_.Length() : 0);
     handler_->OnWritten(ok);
   }
   void OnCancel() override { handler_->OnCancel(); }
@@ -246,10 +195,9 @@ class RenderSequenceCall final : public grpc::ServerBidiReactor<grpc::ByteBuffer
     stall_.Begin();
     StartWrite(&response_);
   }
-  void Finish(const absl::Status& status) override { Reactor::Finish(ToGrpc(status, context_)); }
+  void Finish(const absl::Status& status) override { Reactor::Finish(token_.End(status)); }
 
-  const CallToken token_;
-  CallbackServerContext& context_;
+  CallToken token_;
   StallGuard stall_;
   const std::shared_ptr<RenderSequenceHandler> handler_;
   grpc::ByteBuffer request_;
@@ -271,24 +219,25 @@ class RenderService::Calls final : public CallbackService {
   CallCount& count() { return shared_.count; }
 
   grpc::ServerUnaryReactor* GetServerInfo(CallbackServerContext* context,
-                                          const v1::GetServerInfoRequest* /*request*/,
+                                          const v1::GetServerInfoRequest* request,
                                           v1::GetServerInfoResponse* response) override {
-    return AnswerAtOnce(*context, *response, [&]() -> absl::StatusOr<v1::GetServerInfoResponse> {
-      return halflight::GetServerInfo(shared_.backend);
-    });
+    return AnswerAtOnce(Rpc::kGetServerInfo, *context, *request, *response,
+                        [&]() -> absl::StatusOr<v1::GetServerInfoResponse> {
+                          return halflight::GetServerInfo(shared_.backend);
+                        });
   }
 
   grpc::ServerUnaryReactor* FindMissingParticles(
       CallbackServerContext* context, const v1::FindMissingParticlesRequest* request,
       v1::FindMissingParticlesResponse* response) override {
-    return AnswerAtOnce(*context, *response,
+    return AnswerAtOnce(Rpc::kFindMissingParticles, *context, *request, *response,
                         [&] { return halflight::FindMissingParticles(shared_.backend, *request); });
   }
 
   grpc::ServerUnaryReactor* QueryUpload(CallbackServerContext* context,
                                         const v1::QueryUploadRequest* request,
                                         v1::QueryUploadResponse* response) override {
-    return AnswerAtOnce(*context, *response,
+    return AnswerAtOnce(Rpc::kQueryUpload, *context, *request, *response,
                         [&] { return halflight::QueryUpload(shared_.backend, *request); });
   }
 
@@ -308,20 +257,28 @@ class RenderService::Calls final : public CallbackService {
   }
 
  private:
-  template <typename Response, typename Handler>
-  grpc::ServerUnaryReactor* AnswerAtOnce(CallbackServerContext& context, Response& response,
+  template <typename Request, typename Response, typename Handler>
+  grpc::ServerUnaryReactor* AnswerAtOnce(Rpc rpc, CallbackServerContext& context,
+                                         const Request& request, Response& response,
                                          const Handler& handler) {
-    const CallToken token(shared_.count, shared_.backend.limits, shared_.access, context);
-    absl::Status status = token.refusal();
-    if (status.ok()) {
-      auto answer = handler();
-      status = answer.status();
-      if (answer.ok()) {
-        response = *std::move(answer);
+    grpc::Status status;
+    {
+      // Gone before the call is finished, which may take the context along.
+      CallToken token(rpc, shared_.count, shared_.backend, shared_.access, context);
+      token.OnReceived(request.ByteSizeLong());
+      absl::Status outcome = token.refusal();
+      if (outcome.ok()) {
+        auto answer = handler();
+        outcome = answer.status();
+        if (answer.ok()) {
+          response = *std::move(answer);
+          token.OnSent(response.ByteSizeLong());
+        }
       }
+      status = token.End(outcome);
     }
     grpc::ServerUnaryReactor* const reactor = context.DefaultReactor();
-    reactor->Finish(ToGrpc(status, context));
+    reactor->Finish(status);
     return reactor;
   }
 
@@ -338,6 +295,10 @@ grpc::Service& RenderService::grpc_service() { return *calls_; }
 void RenderService::BeginDrain() { calls_->count().draining = true; }
 
 int RenderService::active_calls() const { return calls_->count().active; }
+
+int RenderService::active_calls(Rpc rpc) const {
+  return calls_->count().active_of[static_cast<size_t>(rpc)];
+}
 
 uint64_t RenderService::calls_begun() const { return calls_->count().begun; }
 

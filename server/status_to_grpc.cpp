@@ -16,8 +16,6 @@ static_assert(static_cast<int>(absl::StatusCode::kDataLoss) == grpc::StatusCode:
 static_assert(static_cast<int>(absl::StatusCode::kUnauthenticated) ==
               grpc::StatusCode::UNAUTHENTICATED);
 
-constexpr std::string_view kReasonPrefix = "ERROR_REASON_";
-
 // With the name that other programs know the message by.
 void AddDetail(rpc::Status& status, const char* name, const google::protobuf::Message& detail) {
   google::protobuf::Any& any = *status.add_details();
@@ -34,7 +32,7 @@ std::string SerializedDetails(const absl::Status& status) {
   told.set_message(MessageOf(status));
   if (detail.reason != v1::ERROR_REASON_UNSPECIFIED) {
     rpc::ErrorInfo info;
-    info.set_reason(v1::ErrorReason_Name(detail.reason).substr(kReasonPrefix.size()));
+    info.set_reason(ReasonName(detail.reason));
     info.set_domain("halflight");
     if (!detail.field.empty()) {
       (*info.mutable_metadata())["value"] = detail.value;

@@ -1,10 +1,10 @@
 #include "server/supervision.h"
 
 #include <fmt/format.h>
-#include <spdlog/spdlog.h>
 
 #include "renderer/block_cache.h"
 #include "renderer/kept_memory.h"
+#include "server/log/log.h"
 #include "server/service_manager.h"
 #include "server/status_text.h"
 
@@ -56,7 +56,7 @@ std::optional<int> Supervision::WaitForEnd() {
     }
     const auto now = Clock::now();
     if (const auto trouble = DeviceTrouble(engine_.state(), patience_, now)) {
-      spdlog::error("device lost reason=\"{}\"", *trouble);
+      Log(LogLevel::kError, "device_lost", {{"message", *trouble}});
       return std::nullopt;
     }
     if (heartbeat.has_value() && now >= next_heartbeat) {

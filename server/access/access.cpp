@@ -6,9 +6,9 @@
 #include <fmt/format.h>
 #include <grpc/grpc_security_constants.h>
 #include <grpcpp/security/auth_context.h>
-#include <spdlog/spdlog.h>
 
 #include "absl/strings/match.h"
+#include "server/log/log.h"
 #include "server/status_text.h"
 
 namespace halflight {
@@ -81,18 +81,12 @@ std::shared_ptr<grpc::ServerCredentials> Access::Credentials() const {
   return encrypts() ? tls_->Credentials() : grpc::InsecureServerCredentials();
 }
 
-absl::StatusOr<Caller> Access::Identify(const grpc::ServerContextBase& context) const {
-  Caller caller{.tenant = "", .peer = context.peer()};
+absl::StatusOr<std::string> Access::TenantOf(const grpc::ServerContextBase& context) const {
   const std::shared_ptr<const TokenTable> known = tokens();
   if (known == nullptr && !trusts_certificates_) {
-    return caller;
+    return "";
   }
-  auto tenant = TenantOf(context, known.get());
-  if (!tenant.ok()) {
-    return tenant.status();
-  }
-  caller.tenant = *std::move(tenant);
-  return caller;
+  return TenantOf(context, known.get());
 }
 
 absl::StatusOr<std::string> Access::TenantOf(const grpc::ServerContextBase& context,
@@ -151,8 +145,9 @@ absl::Status CheckReach(const std::vector<ListeningSocket>& sockets, const Acces
                       "addresses and unix sockets, or all with --insecure-listen",
                       socket.address(), lacks));
     }
-    spdlog::warn("insecure address={} others than this machine can call, {}", socket.address(),
-                 lacks);
+    Log(LogLevel::kWarn, "insecure",
+        {{"address", socket.address()},
+         {"message", fmt::format("others than this machine can call, {}", lacks)}});
   }
   return absl::OkStatus();
 }

@@ -14,7 +14,6 @@
 #include "server/access/tls_credentials.h"
 #include "server/access/tls_files.h"
 #include "server/access/token_table.h"
-#include "server/caller.h"
 #include "server/listen/listening_socket.h"
 
 namespace halflight {
@@ -46,10 +45,11 @@ class Access {
   // For one server; this outlives it.
   [[nodiscard]] std::shared_ptr<grpc::ServerCredentials> Credentials() const;
 
-  // Whose call it is. A token ("authorization: Bearer <token>") goes before a certificate; of a
-  // certificate the tenant is its first URI, else its first DNS name, else its common name.
-  // Unauthenticated where none of them is known here. Any thread.
-  [[nodiscard]] absl::StatusOr<Caller> Identify(const grpc::ServerContextBase& context) const;
+  // Whose call it is: a tenant, or "" where nobody has to say. A token ("authorization: Bearer
+  // <token>") goes before a certificate; of a certificate the tenant is its first URI, else its
+  // first DNS name, else its common name. Unauthenticated where none of them is known here. Any
+  // thread.
+  [[nodiscard]] absl::StatusOr<std::string> TenantOf(const grpc::ServerContextBase& context) const;
 
  private:
   absl::StatusOr<std::string> TenantOf(const grpc::ServerContextBase& context,

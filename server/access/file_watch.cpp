@@ -8,8 +8,8 @@
 #include <sys/stat.h>
 
 #include <fmt/format.h>
-#include <spdlog/spdlog.h>
 
+#include "server/log/log.h"
 #include "server/status_text.h"
 
 namespace halflight {
@@ -57,11 +57,10 @@ void FileWatch::Run(const std::stop_token& stop, const std::function<absl::Statu
     const absl::Status status = reload();
     failed = !status.ok();
     if (!failed) {
-      spdlog::info("reloaded files=\"{}\"", files);
+      Log(LogLevel::kInfo, "reloaded", {{"files", files}});
       last_complaint.clear();
     } else if (const std::string message = MessageOf(status); message != last_complaint) {
-      spdlog::warn("not reloaded, what was loaded before stays files=\"{}\" message=\"{}\"", files,
-                   message);
+      Log(LogLevel::kWarn, "not_reloaded", {{"files", files}, {"message", message}});
       last_complaint = message;
     }
   }

@@ -11,11 +11,10 @@
 #include "server/convert/field_checks.h"
 #include "server/error_detail.h"
 #include "server/particle_upload.h"
+#include "server/request_id.h"
 
 namespace halflight {
 namespace {
-
-constexpr size_t kMaxRequestIdBytes = 128;
 
 void CheckRequestId(const std::string& id, FieldChecks& checks) {
   const std::string allowed =

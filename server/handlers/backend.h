@@ -6,6 +6,7 @@
 #include "renderer/frame_engine.h"
 #include "server/frame_pipeline.h"
 #include "server/limits.h"
+#include "server/metrics/metrics.h"
 #include "server/partial_uploads.h"
 #include "server/particle_store.h"
 
@@ -18,6 +19,7 @@ struct Backend {
   ParticleStore& store;
   PartialUploads& partial_uploads;
   FramePipeline& pipeline;
+  Metrics& metrics = Metrics::None();
 };
 
 }  // namespace halflight

@@ -29,6 +29,8 @@ absl::StatusOr<v1::FindMissingParticlesResponse> FindMissingParticles(
       response.add_missing_sha256(sha256);
     }
   }
+  const auto missing = static_cast<size_t>(response.missing_sha256_size());
+  backend.metrics.OnSetsAsked(static_cast<size_t>(request.sha256_size()) - missing, missing);
   return response;
 }
 

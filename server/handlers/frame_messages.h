@@ -3,6 +3,7 @@
 // made ready; copies no output and sends nothing.
 #pragma once
 
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -20,6 +21,11 @@ inline constexpr size_t kChunkBytes = size_t{256} << 10U;
 class FrameMessages {
  public:
   explicit FrameMessages(std::shared_ptr<const EncodedFrame> frame) : frame_(std::move(frame)) {}
+
+  // Since there was something to send.
+  [[nodiscard]] std::chrono::steady_clock::duration age() const {
+    return std::chrono::steady_clock::now() - begin_;
+  }
 
   // Puts the next part into a RenderFrameResponse or RenderSequenceResponse, whose memory is used
   // again; false after the trailer.
@@ -69,6 +75,7 @@ class FrameMessages {
     }
   }
 
+  const std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
   std::shared_ptr<const EncodedFrame> frame_;
   Part next_ = Part::kHeader;
   size_t output_ = 0;

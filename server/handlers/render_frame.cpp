@@ -3,10 +3,7 @@
 #include <string>
 #include <utility>
 
-#include <spdlog/spdlog.h>
-
 #include "server/convert/convert_frame.h"
-#include "server/frame_log.h"
 
 namespace halflight {
 
@@ -24,7 +21,7 @@ void RenderFrameHandler::Begin(const v1::RenderFrameRequest& request) {
   const absl::Status status =
       stop_.stop_requested() ? absl::CancelledError("the call was cancelled") : Submit(request);
   if (!status.ok()) {
-    spdlog::info(RefusalLogLine(request.request_id(), caller_, status));
+    backend_.metrics.OnFrameRefused(caller_.tenant, status.code());
     sink_.Finish(status);
   }
 }
@@ -35,6 +32,9 @@ absl::Status RenderFrameHandler::Submit(const v1::RenderFrameRequest& request) {
     return job.status();
   }
   job->caller = caller_;
+  if (job->request_id.empty()) {
+    job->request_id = caller_.call_id;
+  }
   return backend_.pipeline.Submit(
       *std::move(job), stop_.get_token(),
       [self = shared_from_this()](const auto& frame) { self->OnFrame(frame); });
@@ -61,6 +61,7 @@ void RenderFrameHandler::WriteNext() {
   if (messages_->Next(outgoing_)) {
     sink_.Write(outgoing_);
   } else {
+    backend_.metrics.OnFrameSent(messages_->age());
     sink_.Finish(absl::OkStatus());
   }
 }

@@ -4,9 +4,8 @@
 #include <utility>
 
 #include <fmt/format.h>
-#include <spdlog/spdlog.h>
-
 #include "server/frame_log.h"
+#include "server/log/log.h"
 #include "server/status_text.h"
 
 namespace halflight {
@@ -40,21 +39,29 @@ void RenderSequenceHandler::Take(absl::StatusOr<FrameJob> job, const std::string
     slots_.push_back(std::make_shared<Slot>());
     slots_.back()->index = next_index_++;
     if (job.ok()) {
-      job->caller = caller_;
       waiting_ = *std::move(job);
       waiting_->caller = caller_;
+      waiting_->request_id = FrameName(request_id, slots_.back()->index);
       may_submit_ = true;
     } else {
-      Refuse(*slots_.back(), request_id, job.status());
+      Refuse(*slots_.back(), FrameName(request_id, slots_.back()->index), job.status());
     }
   }
   Advance();
 }
 
+// Frames that have no names of their own are numbered.
+std::string RenderSequenceHandler::FrameName(const std::string& request_id, uint64_t index) const {
+  return request_id.empty() && !caller_.call_id.empty()
+             ? fmt::format("{}.{}", caller_.call_id, index)
+             : request_id;
+}
+
 // Under the mutex. The stream ends with this frame.
 void RenderSequenceHandler::Refuse(Slot& slot, const std::string& request_id,
                                    const absl::Status& status) {
-  spdlog::info(RefusalLogLine(request_id, caller_, status));
+  Log(LogLevel::kInfo, "frame", RefusedFrameFields(request_id, caller_, status));
+  backend_.metrics.OnFrameRefused(caller_.tenant, status.code());
   slot.result = status;
   requests_ended_ = true;
 }
@@ -176,6 +183,7 @@ RenderSequenceHandler::Step RenderSequenceHandler::NextStep() {
         writing_ = true;
         return Step::kWrite;
       }
+      backend_.metrics.OnFrameSent(messages_->age());
       messages_.reset();
       slots_.pop_front();
       may_submit_ = true;

@@ -64,6 +64,7 @@ class RenderSequenceHandler : public std::enable_shared_from_this<RenderSequence
   // The particles are in memory, or nowhere.
   void Accept(const v1::RenderSequenceRequest& request);
   void Take(absl::StatusOr<FrameJob> job, const std::string& request_id);
+  [[nodiscard]] std::string FrameName(const std::string& request_id, uint64_t index) const;
   void Refuse(Slot& slot, const std::string& request_id, const absl::Status& status);
   void Submit();
   void OnFrame(Slot& slot, FrameOrError result);

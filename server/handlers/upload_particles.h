@@ -16,6 +16,7 @@ class UploadParticlesHandler {
  public:
   using Answer = absl::StatusOr<v1::UploadParticlesResponse>;
 
+  // The backend's parts outlive the handler.
   explicit UploadParticlesHandler(const Backend& backend);
 
   // The next message: none to go on reading, or the answer that ends the call.
@@ -24,6 +25,11 @@ class UploadParticlesHandler {
   Answer OnEndOfRequests();
 
  private:
+  // Counts how the upload ended, if it had begun.
+  Answer End(UploadEnd end, Answer answer);
+
+  Metrics& metrics_;
+  bool begun_ = false;  // its header has arrived
   ParticleUpload upload_;
 };
 

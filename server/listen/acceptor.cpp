@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cerrno>
 #include <chrono>
 #include <cstring>
+#include <mutex>
 #include <optional>
 #include <utility>
 
@@ -17,9 +19,8 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-#include <spdlog/spdlog.h>
-
 #include "server/listen/connections.h"
+#include "server/log/log.h"
 
 namespace halflight {
 namespace {
@@ -77,14 +78,18 @@ class Complaint {
     ++refused_;
     const auto now = std::chrono::steady_clock::now();
     if (!told_.has_value() || now - *told_ >= kQuiet) {
-      spdlog::warn("connections refused=\"{}\" since_last_told={}", why, refused_);
-      refused_ = 0;
+      Log(LogLevel::kWarn, "connections_refused",
+          {{"message", why}, {"since_last_told", refused_ - refused_told_}});
+      refused_told_ = refused_;
       told_ = now;
     }
   }
+  // Any thread.
+  [[nodiscard]] uint64_t refused() const { return refused_; }
 
  private:
-  uint64_t refused_ = 0;
+  std::atomic<uint64_t> refused_ = 0;
+  uint64_t refused_told_ = 0;
   std::optional<std::chrono::steady_clock::time_point> told_;
 };
 
@@ -140,6 +145,11 @@ class Acceptor::Loop {
   // After Run has returned.
   void Close() { sockets_.clear(); }
 
+  ConnectionCounts Counts() {
+    const std::lock_guard lock(mutex_);
+    return {.open = connections_.Count(), .accepted = accepted_, .refused = complaint_.refused()};
+  }
+
  private:
   // False where it is of no use to try again at once.
   bool AcceptAll(int listening) {
@@ -179,13 +189,20 @@ class Acceptor::Loop {
   }
 
   void Take(int fd) {
-    if (connections_.AtLeast(max_connections_)) {
-      close(fd);
+    {
+      const std::lock_guard lock(mutex_);
+      if (!connections_.AtLeast(max_connections_)) {
+        connections_.Add(fd);
+        ++accepted_;
+      } else {
+        close(std::exchange(fd, -1));
+      }
+    }
+    if (fd < 0) {
       complaint_.Count("max_connections are open");
       return;
     }
     WatchPeer(fd);
-    connections_.Add(fd);
     serve_(fd);
   }
 
@@ -208,7 +225,9 @@ class Acceptor::Loop {
   const uint32_t max_connections_;
   const Serve serve_;
   const int wake_;
+  std::mutex mutex_;  // of what others look at
   Connections connections_;
+  uint64_t accepted_ = 0;
   Reserve reserve_;
   Complaint complaint_;
 };
@@ -234,6 +253,8 @@ void Acceptor::Stop() {
     loop_->Close();
   }
 }
+
+ConnectionCounts Acceptor::counts() const { return loop_->Counts(); }
 
 uint32_t RoomForConnections() {
   rlimit limit{};

@@ -15,6 +15,12 @@
 
 namespace halflight {
 
+struct ConnectionCounts {
+  uint64_t open = 0;
+  uint64_t accepted = 0;  // all that were ever handed on
+  uint64_t refused = 0;   // all that were turned away
+};
+
 class Acceptor {
  public:
   // Takes over a connected socket that does not block; the acceptor's thread.
@@ -34,6 +40,9 @@ class Acceptor {
   // Closes the sockets: nobody can connect any more, but those connected stay. When it has
   // returned `serve` is not called again.
   void Stop();
+
+  // Looks at every connection. Any thread.
+  [[nodiscard]] ConnectionCounts counts() const;
 
  private:
   class Loop;

@@ -34,9 +34,9 @@ union SocketName {
   sockaddr_un path;
 };
 
-absl::Status CannotListen(const std::string& address, int error) {
+absl::Status CannotListen(const char* flag, const std::string& address, int error) {
   return absl::UnavailableError(
-      fmt::format("--address {}: cannot listen there: {}", address, std::strerror(error)));
+      fmt::format("{} {}: cannot listen there: {}", flag, address, std::strerror(error)));
 }
 
 bool IsLocal(const SocketName& name) {
@@ -93,7 +93,7 @@ struct FreeAddresses {
 using Addresses = std::unique_ptr<addrinfo, FreeAddresses>;
 
 // What a host name stands for. A host may stand in brackets, as IPv6 addresses have to.
-absl::StatusOr<Addresses> Resolve(const std::string& address) {
+absl::StatusOr<Addresses> Resolve(const std::string& address, const char* flag) {
   const size_t colon = address.rfind(':');
   std::string host = address.substr(0, colon);
   if (host.size() > 2 && host.front() == '[' && host.back() == ']') {
@@ -107,7 +107,7 @@ absl::StatusOr<Addresses> Resolve(const std::string& address) {
   const int error = getaddrinfo(host.c_str(), address.c_str() + colon + 1, &hints, &found);
   if (error != 0) {
     return absl::UnavailableError(
-        fmt::format("--address {}: no such host: {}", address, gai_strerror(error)));
+        fmt::format("{} {}: no such host: {}", flag, address, gai_strerror(error)));
   }
   return Addresses(found);
 }
@@ -127,12 +127,14 @@ ListeningSocket::~ListeningSocket() {
 
 ListeningSocket::ListeningSocket(ListeningSocket&& other) noexcept
     : fd_(std::exchange(other.fd_, -1)),
+      flag_(other.flag_),
       address_(std::move(other.address_)),
       local_(other.local_),
       file_(std::move(other.file_)) {}
 
 ListeningSocket& ListeningSocket::operator=(ListeningSocket&& other) noexcept {
   std::swap(fd_, other.fd_);
+  std::swap(flag_, other.flag_);
   std::swap(address_, other.address_);
   std::swap(local_, other.local_);
   std::swap(file_, other.file_);
@@ -140,21 +142,22 @@ ListeningSocket& ListeningSocket::operator=(ListeningSocket&& other) noexcept {
 }
 
 absl::Status ListeningSocket::Listen() {
-  return listen(fd_, kBacklog) == 0 ? absl::OkStatus() : CannotListen(address_, errno);
+  return listen(fd_, kBacklog) == 0 ? absl::OkStatus() : CannotListen(flag_, address_, errno);
 }
 
 absl::StatusOr<ListeningSocket> ListeningSocket::BindUnix(const std::string& address,
-                                                          const std::string& path) {
+                                                          const std::string& path,
+                                                          const char* flag) {
   if (const absl::Status status = RemoveStaleSocket(path); !status.ok()) {
-    return Prefixed(fmt::format("--address {}: ", address), status);
+    return Prefixed(fmt::format("{} {}: ", flag, address), status);
   }
-  ListeningSocket made(socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0), address,
-                       true, "");
+  ListeningSocket made(socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0), flag,
+                       address, true);
   sockaddr_un name{};
   name.sun_family = AF_UNIX;
   path.copy(name.sun_path, sizeof(name.sun_path) - 1);
   if (made.fd_ < 0 || bind(made.fd_, reinterpret_cast<const sockaddr*>(&name), sizeof(name)) != 0) {
-    return CannotListen(address, errno);
+    return CannotListen(flag, address, errno);
   }
   made.file_ = path;
   if (absl::Status status = made.Listen(); !status.ok()) {
@@ -163,17 +166,18 @@ absl::StatusOr<ListeningSocket> ListeningSocket::BindUnix(const std::string& add
   return made;
 }
 
-absl::StatusOr<std::vector<ListeningSocket>> ListeningSocket::Bind(const std::string& address) {
+absl::StatusOr<std::vector<ListeningSocket>> ListeningSocket::Bind(const std::string& address,
+                                                                   const char* flag) {
   std::vector<ListeningSocket> sockets;
   if (const std::string path = SocketPath(address); !path.empty()) {
-    auto made = BindUnix(address, path);
+    auto made = BindUnix(address, path, flag);
     if (!made.ok()) {
       return made.status();
     }
     sockets.push_back(*std::move(made));
     return sockets;
   }
-  const auto places = Resolve(address);
+  const auto places = Resolve(address, flag);
   if (!places.ok()) {
     return places.status();
   }
@@ -184,18 +188,18 @@ absl::StatusOr<std::vector<ListeningSocket>> ListeningSocket::Bind(const std::st
       SetPort(*place->ai_addr, port);
     }
     ListeningSocket made(
-        socket(place->ai_family, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, IPPROTO_TCP), address,
-        false, "");
+        socket(place->ai_family, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, IPPROTO_TCP), flag,
+        address, false);
     const int yes = 1;
     // A restarted server need not wait for its predecessor's connections to be forgotten.
     if (made.fd_ < 0 || setsockopt(made.fd_, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof(yes)) != 0 ||
         bind(made.fd_, place->ai_addr, place->ai_addrlen) != 0) {
       // "localhost" also stands for ::1 where there is no IPv6.
       if (errno == EAFNOSUPPORT || errno == EADDRNOTAVAIL) {
-        skipped = CannotListen(address, errno);
+        skipped = CannotListen(flag, address, errno);
         continue;
       }
-      return CannotListen(address, errno);
+      return CannotListen(flag, address, errno);
     }
     SocketName name{};
     socklen_t length = sizeof(name);
@@ -237,7 +241,7 @@ absl::StatusOr<ListeningSocket> ListeningSocket::Adopt(int fd) {
   }
   fcntl(fd, F_SETFD, FD_CLOEXEC);
   fcntl(fd, F_SETFL, fcntl(fd, F_GETFL) | O_NONBLOCK);
-  return ListeningSocket(fd, TextOf(name, name_length), IsLocal(name), "");
+  return ListeningSocket(fd, "LISTEN_FDS", TextOf(name, name_length), IsLocal(name));
 }
 
 }  // namespace halflight

@@ -16,8 +16,9 @@ class ListeningSocket {
   // Takes every place that "host:port" or "unix:path" stands for: of a name with several addresses
   // each, on the same port; port 0 takes a free one. A unix socket listens at once, so that no
   // other server takes its file for a dead one's; a TCP socket refuses connections until Listen.
-  // AlreadyExists, Unavailable and InvalidArgument "--address <address>: <why>".
-  static absl::StatusOr<std::vector<ListeningSocket>> Bind(const std::string& address);
+  // AlreadyExists, Unavailable and InvalidArgument "<flag> <address>: <why>".
+  static absl::StatusOr<std::vector<ListeningSocket>> Bind(const std::string& address,
+                                                           const char* flag = "--address");
 
   // The sockets of all addresses, behind those `given`.
   static absl::StatusOr<std::vector<ListeningSocket>> BindAll(
@@ -44,13 +45,14 @@ class ListeningSocket {
   [[nodiscard]] bool local() const { return local_; }
 
  private:
-  ListeningSocket(int fd, std::string address, bool local, std::string file)
-      : fd_(fd), address_(std::move(address)), local_(local), file_(std::move(file)) {}
+  ListeningSocket(int fd, const char* flag, std::string address, bool local)
+      : fd_(fd), flag_(flag), address_(std::move(address)), local_(local) {}
 
   static absl::StatusOr<ListeningSocket> BindUnix(const std::string& address,
-                                                  const std::string& path);
+                                                  const std::string& path, const char* flag);
 
   int fd_ = -1;
+  const char* flag_;  // that asked for it
   std::string address_;
   bool local_ = false;
   std::string file_;  // to be removed; empty: none

@@ -117,7 +117,7 @@ TEST_F(Secured, LogSaysWhoseFramesTheyAre) {
         std::pair("by-dns", "bob.example"), std::pair("by-uri", "spiffe://example/bob")}) {
     EXPECT_TRUE(WaitFor([&, id = id, tenant = tenant] {
       return server.Logged(
-          fmt::format("frame request_id=\"{}\" tenant=\"{}\" peer=\"ipv4:127.0.0.1:", id, tenant));
+          fmt::format("frame request_id={} tenant={} peer=ipv4:127.0.0.1:", id, tenant));
     })) << server.Err();
   }
 }
@@ -127,9 +127,9 @@ TEST_F(Secured, LogSaysWhatWasReadAgain) {
   ASSERT_NE(server.Address(), "");
   const std::string tokens = folder_.Write("tokens", "damaged\n");
   EXPECT_TRUE(WaitFor([&] { return server.Logged(tokens + ": line 1"); })) << server.Err();
-  EXPECT_TRUE(server.Logged("not reloaded"));
+  EXPECT_TRUE(server.Logged("not_reloaded"));
   [[maybe_unused]] const auto good = folder_.Write("tokens", ToHex(Sha256Of("another")) + " bob\n");
-  EXPECT_TRUE(WaitFor([&] { return server.Logged(" reloaded files=\"" + tokens); }));
+  EXPECT_TRUE(WaitFor([&] { return server.Logged(" reloaded files=" + tokens); }));
 }
 
 TEST_F(Secured, ConfigFileSaysAllThatFlagsCan) {

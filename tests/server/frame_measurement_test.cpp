@@ -264,8 +264,8 @@ TEST(FrameLog, TellsTheRelativeError) {
   MadeFrame frame;
   frame.rendered.timings = {{"total", 2.0}};
   frame.error.emplace().relative_rmse.value = 0.03125;
-  EXPECT_THAT(FrameLogLine(MustConvert(), frame, absl::OkStatus()),
-              HasSubstr("total_ms=2.00 relative_rmse=0.03125 outcome=OK"));
+  EXPECT_THAT(LogText("frame", FrameFields(MustConvert(), frame, absl::OkStatus())),
+              HasSubstr("total_ms=2 relative_rmse=0.03125 outcome=OK"));
 }
 
 }  // namespace

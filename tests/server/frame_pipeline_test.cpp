@@ -287,11 +287,14 @@ TEST(FrameLog, IsOneLineOfKeysWhateverTheClientSends) {
   job.request_id = "a \"b\" \\";
   MadeFrame frame;
   frame.rendered.timings = {{"light sweep", 1.5}, {"total", 2.0}};
-  const std::string line = FrameLogLine(job, frame, absl::InternalError("two\nlines"));
+  job.caller = {.tenant = "b", .peer = "ipv4:1.2.3.4:5", .call_id = "c"};
+  const std::string line =
+      LogText("frame", FrameFields(job, frame, absl::InternalError("two\nlines")));
   EXPECT_THAT(line, HasSubstr(R"(request_id="a \"b\" \\")"));
+  EXPECT_THAT(line, HasSubstr(" call_id=c tenant=b peer=ipv4:1.2.3.4:5 technique="));
   EXPECT_THAT(line, HasSubstr("technique=SHADOW_TECHNIQUE_HALF_ANGLE particles=2 size=64x48"));
-  EXPECT_THAT(line, HasSubstr("light_sweep_ms=1.50 total_ms=2.00 outcome=INTERNAL"));
-  EXPECT_THAT(line, HasSubstr(R"(message="two?lines")"));
+  EXPECT_THAT(line, HasSubstr("light_sweep_ms=1.5 total_ms=2 outcome=INTERNAL"));
+  EXPECT_THAT(line, HasSubstr(R"(message="two\nlines")"));
   EXPECT_EQ(line.find('\n'), std::string::npos);
 }
 

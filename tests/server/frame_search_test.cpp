@@ -395,7 +395,7 @@ TEST_F(Search, IsToldInTheImages) {
 TEST(FrameLog, TellsWhatBecameOfATarget) {
   MadeFrame frame;
   frame.target.emplace().attempts.resize(3);
-  EXPECT_THAT(FrameLogLine(MustConvert(), frame, absl::OkStatus()),
+  EXPECT_THAT(LogText("frame", FrameFields(MustConvert(), frame, absl::OkStatus())),
               HasSubstr("attempts=3 target_met=false outcome=OK"));
 }
 

@@ -425,11 +425,133 @@ TEST_F(Service, ReflectionListsTheServiceAndHealth) {
   EXPECT_THAT(listed, HasSubstr("grpc.health.v1.Health"));
 }
 
-TEST_F(Service, HealthTurnsWhenTheDrainBegins) {
-  // HealthCheckResponse { status = 1 }: SERVING is 1, NOT_SERVING 2.
-  EXPECT_EQ(AskOnce(channel_, "/grpc.health.v1.Health/Check", ""), std::string("\x08\x01"));
+// HealthCheckRequest { service = 1 }, of the whole server and of the service.
+std::vector<std::string> Healths(const std::shared_ptr<grpc::Channel>& channel) {
+  std::vector<std::string> answers;
+  for (const std::string service : {"", "halflight.v1.RenderService"}) {
+    const std::string request =
+        "\x0a" + std::string(1, static_cast<char>(service.size())) + service;
+    answers.push_back(AskOnce(channel, "/grpc.health.v1.Health/Check", request));
+  }
+  return answers;
+}
+
+// HealthCheckResponse { status = 1 }: SERVING is 1, NOT_SERVING 2.
+const std::vector<std::string> kAllServing = {"\x08\x01", "\x08\x01"};
+const std::vector<std::string> kNoneServing = {"\x08\x02", "\x08\x02"};
+
+TEST_F(Service, HealthTurnsWhenTheDrainBeginsAndStaysSo) {
+  EXPECT_EQ(Healths(channel_), kAllServing);
   server_->BeginDrain();
-  EXPECT_EQ(AskOnce(channel_, "/grpc.health.v1.Health/Check", ""), std::string("\x08\x02"));
+  EXPECT_EQ(Healths(channel_), kNoneServing);
+  server_->SetServing(true);
+  EXPECT_EQ(Healths(channel_), kNoneServing);
+  EXPECT_FALSE(server_->serving());
+}
+
+TEST_F(Service, HealthSaysWhatItIsTold) {
+  server_->SetServing(false);
+  EXPECT_EQ(Healths(channel_), kNoneServing);
+  EXPECT_FALSE(server_->serving());
+  // Calls are served nevertheless: who watches health decides.
+  EXPECT_TRUE(RenderAll(MakeRequest()).ok());
+  server_->SetServing(true);
+  EXPECT_EQ(Healths(channel_), kAllServing);
+  EXPECT_TRUE(server_->serving());
+}
+
+// The name that a call has, as its initial metadata say.
+std::string NameOfCall(const grpc::ClientContext& context) {
+  const auto found = context.GetServerInitialMetadata().find("x-request-id");
+  return found == context.GetServerInitialMetadata().end()
+             ? ""
+             : std::string(found->second.data(), found->second.size());
+}
+
+TEST_F(Service, CallHasTheNameThatItsClientGaveIt) {
+  struct Case {
+    std::string metadata;
+    std::string field;
+    std::string call;   // "": a new one
+    std::string frame;  // "": the call's
+  };
+  const std::string too_long(129, 'x');
+  for (const Case& named :
+       {Case{"", "", "", ""}, Case{"by metadata", "", "by metadata", ""},
+        Case{"", "by field", "by field", ""},
+        Case{"by metadata", "by field", "by metadata", "by field"},
+        Case{too_long, "by field", "by field", ""}, Case{too_long, "", "", ""}}) {
+    grpc::ClientContext context;
+    if (!named.metadata.empty()) {
+      context.AddMetadata("x-request-id", named.metadata);
+    }
+    v1::RenderFrameRequest request = MakeRequest();
+    request.set_request_id(named.field);
+    auto reader = stub_->RenderFrame(&context, request);
+    v1::RenderFrameResponse response;
+    std::string frame;
+    while (reader->Read(&response)) {
+      frame = response.has_header() ? response.header().metadata().request_id() : frame;
+    }
+    EXPECT_TRUE(reader->Finish().ok());
+    const std::string call = NameOfCall(context);
+    if (named.call.empty()) {
+      EXPECT_THAT(call, ::testing::MatchesRegex("[0-9a-f]{16}-[0-9]+"));
+    } else {
+      EXPECT_EQ(call, named.call);
+    }
+    EXPECT_EQ(frame, named.frame.empty() ? call : named.frame);
+  }
+}
+
+TEST_F(Service, RefusedCallsUploadsAndQuestionsHaveNamesToo) {
+  engine_.RefuseWith(absl::UnavailableError("not now"));
+  {
+    grpc::ClientContext context;
+    context.AddMetadata("x-request-id", "refused");
+    auto reader = stub_->RenderFrame(&context, {});
+    v1::RenderFrameResponse response;
+    EXPECT_FALSE(reader->Read(&response));
+    EXPECT_FALSE(reader->Finish().ok());
+    EXPECT_EQ(NameOfCall(context), "refused");
+  }
+  {
+    grpc::ClientContext context;
+    context.AddMetadata("x-request-id", "upload");
+    v1::UploadParticlesResponse response;
+    const auto writer = stub_->UploadParticles(&context, &response);
+    writer->WritesDone();
+    EXPECT_FALSE(writer->Finish().ok());
+    EXPECT_EQ(NameOfCall(context), "upload");
+  }
+  server_->BeginDrain();
+  grpc::ClientContext context;
+  context.AddMetadata("x-request-id", "question");
+  v1::GetServerInfoResponse info;
+  EXPECT_FALSE(stub_->GetServerInfo(&context, {}, &info).ok());
+  EXPECT_EQ(NameOfCall(context), "question");
+}
+
+TEST_F(Service, FramesOfASequenceAreNumberedWhereTheyHaveNoNames) {
+  grpc::ClientContext context;
+  context.AddMetadata("x-request-id", "shot");
+  auto stream = stub_->RenderSequence(&context);
+  for (const char* name : {"", "mine", ""}) {
+    v1::RenderSequenceRequest request;
+    *request.mutable_frame() = MakeRequest();
+    request.mutable_frame()->set_request_id(name);
+    stream->Write(request);
+  }
+  stream->WritesDone();
+  std::vector<std::string> names;
+  v1::RenderSequenceResponse response;
+  while (stream->Read(&response)) {
+    if (response.has_header()) {
+      names.push_back(response.header().metadata().request_id());
+    }
+  }
+  EXPECT_TRUE(stream->Finish().ok());
+  EXPECT_EQ(names, (std::vector<std::string>{"shot.0", "mine", "shot.2"}));
 }
 
 }  // namespace

@@ -225,7 +225,7 @@ TEST_F(Killed, DamagedSetIsSentAgainByTheClientWithoutAWord) {
   auto client = client::Client::Connect(address);
   const auto frame = client->RenderFrame(Request(), &particles);
   ASSERT_TRUE(frame.ok()) << frame.status();
-  EXPECT_THAT(server.Err(), HasSubstr("is missing now: its SHA-256 is"));
+  EXPECT_THAT(server.Err(), HasSubstr("message=\"its SHA-256 is"));
   EXPECT_EQ(client->upload_totals().sent_bytes, 12000U);
   EXPECT_TRUE(WaitFor([&] { return Sha256Of(Contents(file)) == particles.sha256; }));
 }

@@ -1,0 +1,79 @@
+// One call under way: whose it is, whether it is served, and what the log and the metrics learn of
+// it when it ends. Knows nothing of what the call does.
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <chrono>
+#include <cstdint>
+#include <string>
+
+#include <grpcpp/server_context.h>
+#include <grpcpp/support/status.h>
+
+#include "absl/status/status.h"
+#include "server/access/access.h"
+#include "server/caller.h"
+#include "server/handlers/backend.h"
+#include "server/metrics/metrics.h"
+
+namespace halflight {
+
+// How many calls are under way, and whether more may come.
+struct CallCount {
+  std::atomic<int> active = 0;
+  std::array<std::atomic<int>, kRpcs> active_of{};
+  std::atomic<uint64_t> begun = 0;
+  std::atomic<bool> draining = false;
+};
+
+// Counted before draining is looked at, so that whoever drains and then sees no calls can be sure
+// that none slips in, and that the log has a line of each.
+class CallToken {
+ public:
+  // At the beginning of a call, whose name the client learns by its initial metadata: the one that
+  // it sent as x-request-id, else `request_id` of the request's message, else a new one. One that
+  // is none (request_id.h) counts as not sent. All but the name outlives the token.
+  CallToken(Rpc rpc, CallCount& count, const Backend& backend, const Access& access,
+            grpc::CallbackServerContext& context, const std::string& request_id = "");
+  // At its end.
+  ~CallToken();
+  CallToken(const CallToken&) = delete;
+  CallToken& operator=(const CallToken&) = delete;
+  CallToken(CallToken&&) = delete;
+  CallToken& operator=(CallToken&&) = delete;
+
+  // Why the call is not served, or OK.
+  [[nodiscard]] const absl::Status& refusal() const { return refusal_; }
+  // Of no tenant where it is refused.
+  [[nodiscard]] const Caller& caller() const { return caller_; }
+
+  // A message of so many bytes. Each by one thread at a time.
+  void OnReceived(size_t bytes);
+  void OnSent(size_t bytes);
+
+  // Ends the call because its peer has kept it waiting for so long. Any thread; the token may be
+  // gone when it returns.
+  void EndForStall(std::chrono::seconds waited);
+
+  // What to finish the call with, right before that.
+  grpc::Status End(const absl::Status& status);
+
+ private:
+  [[nodiscard]] Cancellation EndedBy() const;
+  void WriteLog(const absl::Status& outcome, Cancellation by) const;
+
+  const Rpc rpc_;
+  CallCount& count_;
+  Metrics& metrics_;
+  grpc::CallbackServerContext& context_;
+  const std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
+  Caller caller_;
+  absl::Status refusal_;
+  std::atomic<uint64_t> received_ = 0;
+  std::atomic<uint64_t> sent_ = 0;
+  std::atomic<bool> stalled_ = false;
+  absl::Status outcome_ = absl::CancelledError("ended by nobody");
+};
+
+}  // namespace halflight
