@@ -76,6 +76,10 @@ class HealthProbe {
   std::jthread thread_;
 };
 
+// Over a new connection: where one was turned away, gRPC makes it again only while somebody waits
+// on its channel, and calls that fail at once do not.
+bool ServesNewcomers(const std::string& address) { return Health(NewChannel(address)) == kServing; }
+
 void RaiseOwnLimit() {
   rlimit limit{};
   getrlimit(RLIMIT_NOFILE, &limit);
@@ -150,17 +154,12 @@ TEST(Connections, WithoutDescriptorsThoseInsideAreServedAndOthersWhenSomeAreFree
   // The same descriptors, given back: the limit stays.
   idle.clear();
   const auto start = Clock::now();
-  const auto outside = NewChannel(address);
-  EXPECT_TRUE(WaitFor([&] { return Health(outside) == kServing; }));
+  EXPECT_TRUE(WaitFor([&] { return ServesNewcomers(address); }));
   Tell("serving again", MillisecondsSince(start), 1000);
   EXPECT_EQ(Health(inside), kServing);
 }
 
 TEST(Connections, BeyondTheirLimitAreClosedAtOnceAndTellItInTheLog) {
-  if (!LongTests()) {
-    GTEST_SKIP() << "the daemon takes ten seconds to refuse, and once did not tell; AcceptorTest "
-                    "holds the acceptor alone to it";
-  }
   const Folder folder;
   const Daemon server(folder, {"--max-connections", "3"});
   const auto inside = NewChannel(server.Address());
@@ -173,11 +172,11 @@ TEST(Connections, BeyondTheirLimitAreClosedAtOnceAndTellItInTheLog) {
     ClientSocket fourth;
     return fourth.Connect(server.Address()) && fourth.HangsUpWithin(100);
   }));
-  EXPECT_THAT(server.Err(), HasSubstr("max_connections"));
+  // Told right after.
+  EXPECT_TRUE(WaitFor([&] { return server.Logged("max_connections"); })) << server.Err();
   EXPECT_EQ(Health(inside), kServing);
   others.clear();
-  const auto next = NewChannel(server.Address());
-  EXPECT_TRUE(WaitFor([&] { return Health(next) == kServing; }));
+  EXPECT_TRUE(WaitFor([&] { return ServesNewcomers(server.Address()); }));
 }
 
 TEST(Connections, GarbageAndSilenceEndInTimeAndHurtNobody) {

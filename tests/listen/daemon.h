@@ -6,8 +6,6 @@
 #include <string>
 #include <vector>
 
-#include <filesystem>
-
 #include <gtest/gtest.h>
 
 #include "client/client.h"
@@ -27,16 +25,6 @@ class Daemon : public Process {
   explicit Daemon(const Folder& folder, std::vector<std::string> arguments = {},
                   ProcessOptions options = {})
       : Process(folder, "halflightd_fake", WithAddress(std::move(arguments)), std::move(options)) {}
-
-  [[nodiscard]] bool Logged(const std::string& text) const {
-    return Err().find(text) != std::string::npos;
-  }
-  // Entries of a folder of /proc: "fd", "task".
-  [[nodiscard]] size_t Count(const std::string& what) const {
-    const std::filesystem::directory_iterator entries("/proc/" + std::to_string(pid()) + "/" +
-                                                      what);
-    return static_cast<size_t>(std::distance(begin(entries), end(entries)));
-  }
 
  private:
   static std::vector<std::string> WithAddress(std::vector<std::string> arguments) {

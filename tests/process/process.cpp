@@ -114,6 +114,15 @@ std::string Process::Address() const {
   return address;
 }
 
+bool Process::Logged(const std::string& text) const {
+  return Err().find(text) != std::string::npos;
+}
+
+size_t Process::Count(const std::string& what) const {
+  const fs::directory_iterator entries("/proc/" + std::to_string(pid_) + "/" + what);
+  return static_cast<size_t>(std::distance(begin(entries), end(entries)));
+}
+
 Ended RunHalflight(const Folder& folder, const std::vector<std::string>& arguments,
                    const ProcessOptions& options) {
   Process process(folder, "halflight", arguments, options);

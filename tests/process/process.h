@@ -51,6 +51,10 @@ class Process {
   [[nodiscard]] std::string Err() const;
   // Of halflightd: the address in the line that says it listens.
   [[nodiscard]] std::string Address() const;
+  // Of halflightd: whether its log has such a text.
+  [[nodiscard]] bool Logged(const std::string& text) const;
+  // While it runs: entries of a folder of /proc, "fd" or "task".
+  [[nodiscard]] size_t Count(const std::string& what) const;
 
  private:
   std::string log_;  // the beginning of the names of both logs

@@ -7,9 +7,10 @@
 
 namespace halflight::testing {
 
-// Until `ready` holds, a minute at most; whether it does.
-inline bool WaitFor(const std::function<bool()>& ready) {
-  const auto until = std::chrono::steady_clock::now() + std::chrono::minutes(1);
+// Until `ready` holds, a minute at most unless said otherwise; whether it does.
+inline bool WaitFor(const std::function<bool()>& ready,
+                    std::chrono::seconds at_most = std::chrono::minutes(1)) {
+  const auto until = std::chrono::steady_clock::now() + at_most;
   while (!ready()) {
     if (std::chrono::steady_clock::now() >= until) {
       return false;

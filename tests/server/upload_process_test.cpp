@@ -1,12 +1,9 @@
-// Uploads across processes that are killed: clients at random offsets, and the server, with a cache
-// directory, at random moments. HALFLIGHT_UPLOAD_LONG=1 in the environment kills each 200 times.
+// Uploads across restarts of the server, and kills, with a cache directory. Kills by the hundred
+// are the soak's: tests/soak/uploads.cpp.
 
 #include <csignal>
-#include <cstdlib>
 #include <filesystem>
-#include <iostream>
 #include <optional>
-#include <random>
 #include <string>
 #include <thread>
 #include <vector>
@@ -33,11 +30,6 @@ using ::testing::HasSubstr;
 using testing::MakeParticles;
 using testing::Process;
 using testing::WaitFor;
-
-int Kills() {
-  const char* const is_long = std::getenv("HALFLIGHT_UPLOAD_LONG");
-  return is_long != nullptr && std::string(is_long) == "1" ? 200 : 10;
-}
 
 v1::InlineParticles SetOf(int particles) {
   return MakeParticles(particles, {v1::PARTICLE_ATTRIBUTE_POSITION});
@@ -70,95 +62,15 @@ class Killed : public ::testing::Test {
     return response;
   }
 
-  size_t Below(size_t n) { return std::uniform_int_distribution<size_t>(0, n - 1)(random_); }
-
   const testing::Folder folder_;
-  std::mt19937 random_{20263};
 };
 
-TEST_F(Killed, ClientsAtAnyOffsetLeaveAnUploadThatGoesOn) {
-  const std::string address = "unix:" + folder_ / "socket";
-  const Process server(folder_, "halflightd_fake",
-                       {"--address", address, "--cache-dir", folder_ / "cache"});
-  ASSERT_EQ(server.Address(), address);
-  auto client = client::Client::Connect(address);
-  ASSERT_TRUE(client.ok());
-  for (int kill = 0; kill < Kills(); ++kill) {
-    const int count = 200000 + kill;  // 2.4 MB, a set of its own each time
-    const client::EncodedParticles particles = Encoded(count);
-    const uint64_t size = particles.payload.size();
-    // Once or twice: the second goes on where the first was killed.
-    uint64_t least = 0;
-    for (size_t times = 1 + Below(2); times > 0; --times) {
-      const size_t chunk = 1 + Below(300000);
-      const uint64_t die_at = Below(size);
-      Process child(
-          folder_, "upload_child",
-          {address, std::to_string(count), std::to_string(chunk), std::to_string(die_at)});
-      EXPECT_EQ(child.Wait(), -1) << "it was to be killed: " << child.Err();
-      // What was received before is kept again, once the server knows that the client is gone.
-      ASSERT_TRUE(
-          WaitFor([&] { return Query(address, particles.sha256).committed_bytes() >= least; }));
-      const v1::QueryUploadResponse there = Query(address, particles.sha256);
-      EXPECT_FALSE(there.complete());
-      EXPECT_LE(there.committed_bytes(), size);
-      least = there.committed_bytes();
-    }
-    const absl::Status status = client->EnsureUploaded(particles);
-    ASSERT_TRUE(status.ok()) << status;
-    ASSERT_TRUE(Query(address, particles.sha256).complete());
-    const std::string file = folder_ / "cache/" + ToHex(particles.sha256) + ".particles";
-    ASSERT_TRUE(WaitFor([&] { return fs::exists(file); }));
-    EXPECT_EQ(Sha256Of(Contents(file)), particles.sha256);
-  }
-  const client::UploadTotals totals = client->upload_totals();
-  std::cout << "killed " << Kills() << " clients: " << totals.sent_bytes << " bytes sent again, "
-            << totals.saved_bytes << " saved\n";
-  EXPECT_GT(totals.saved_bytes, 0U);
-}
-
-TEST_F(Killed, ServerAtAnyMomentLeavesWholeSetsOrNone) {
+TEST_F(Killed, ServerHasWhatItHadAndItsClientsRideOverIt) {
   const std::string address = "unix:" + folder_ / "socket";
   const std::string cache = folder_ / "cache";
   client::ClientOptions options;
   options.max_attempts = 1000;
   options.first_backoff = std::chrono::milliseconds(10);
-  std::vector<client::EncodedParticles> sets;
-  for (int i = 0; i < 6; ++i) {
-    sets.push_back(Encoded(100000 + i));
-  }
-  int found = 0;
-  for (int kill = 0; kill < Kills(); ++kill) {
-    Process server(folder_, "halflightd_fake", {"--address", address, "--cache-dir", cache});
-    ASSERT_EQ(server.Address(), address);
-    // Files of sets are whole, and nothing else of theirs is left.
-    for (const auto& entry : fs::directory_iterator(cache)) {
-      const std::string name = entry.path().filename();
-      if (name != "halflightd.lock") {
-        ++found;
-        EXPECT_EQ(name, ToHex(Sha256Of(Contents(entry.path()))) + ".particles");
-      }
-    }
-    std::jthread client_thread([&, order = Below(sets.size())] {
-      client::ClientOptions once;
-      once.timeout = std::chrono::seconds(1);
-      once.max_attempts = 1;
-      auto client = client::Client::Connect(address, once);
-      for (size_t i = 0; i < sets.size(); ++i) {
-        client->EnsureUploaded(sets[(i + order) % sets.size()]).IgnoreError();
-      }
-    });
-    std::this_thread::sleep_for(std::chrono::milliseconds(Below(200)));
-    server.Signal(SIGKILL);
-    EXPECT_EQ(server.Wait(), -1);
-    client_thread.join();
-    // So that there is always something to write.
-    fs::remove(cache + "/" + ToHex(sets[Below(sets.size())].sha256) + ".particles");
-  }
-  std::cout << "killed the server " << Kills() << " times: found " << found << " whole sets\n";
-  EXPECT_GT(found, 0);
-
-  // A client that retries rides over a kill and a restart.
   std::optional<Process> server;
   server.emplace(folder_, "halflightd_fake",
                  std::vector<std::string>{"--address", address, "--cache-dir", cache});

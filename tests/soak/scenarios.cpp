@@ -1,0 +1,76 @@
+#include <array>
+
+#include "absl/strings/str_cat.h"
+#include "tests/soak/scenario.h"
+
+namespace halflight::soak {
+
+void Require(bool holds, const std::string& what) {
+  if (!holds) {
+    throw Abandoned(what);
+  }
+}
+
+void Require(const absl::Status& status, const std::string& what) {
+  Require(status.ok(), absl::StrCat(what, ": ", status.ToString()));
+}
+
+std::span<const Scenario> Scenarios() {
+  static const std::array kScenarios{
+      Scenario{"connections",
+               "1000 clients, 500 of which do not read their frames",
+               "`--max-stall-seconds 0`: who does not read keeps its call",
+               {"slow readers ended"},
+               RunConnections},
+      Scenario{
+          "cancellations",
+          "10,000 calls cancelled at random moments",
+          "an engine that keeps memory, a descriptor and a thread of each cancelled frame, and "
+          "draws other pixels from then on",
+          {"descriptors more", "threads more", "memory more", "frames that are other"},
+          RunCancellations},
+      Scenario{"upload clients killed",
+               "clients killed at random offsets of an upload",
+               "`--partial-upload-seconds 0`: nothing is kept of what broke off",
+               {"of these not sent again"},
+               RunUploadClientsKilled},
+      Scenario{"upload servers killed",
+               "the server killed at random moments of uploads, with a cache directory",
+               "a disk that loses half of a file",
+               {"sets found that are not"},
+               RunUploadServersKilled},
+      Scenario{"descriptors",
+               "no descriptor left in the server, then some again",
+               "gRPC's own listener in place of halflightd's",
+               {"times that newcomers were not served"},
+               RunDescriptors},
+      Scenario{"disk full",
+               "a cache directory on a disk that is full",
+               "a disk that loses half of a file, and an engine that draws other pixels each time",
+               {"files that are not the set", "pictures that are others"},
+               RunDiskFull},
+      Scenario{"malformed",
+               "malformed, truncated, oversize and out-of-order messages of each RPC",
+               "a server that says OK to everything",
+               {"ended with OK"},
+               RunMalformed},
+      Scenario{"overload",
+               "ten times as many frames asked for as can be drawn",
+               "a queue without a bound",
+               {"refusals answered within, 99th"},
+               RunOverload},
+      Scenario{"restarts",
+               "SIGTERM under load",
+               "`--drain-seconds 0`, and an engine that loses every fifth frame",
+               {"exit codes other than 0", "accepted by the log, and not whole",
+                "accepted by the log, with"},
+               RunRestarts},
+      Scenario{"mixed work",
+               "uploads, frames, sequences, cancellations and errors for 15 minutes",
+               "an engine that keeps memory of each frame",
+               {"memory more, from when"},
+               RunMixedWork}};
+  return kScenarios;
+}
+
+}  // namespace halflight::soak

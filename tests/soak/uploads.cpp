@@ -1,0 +1,198 @@
+// Uploads whose clients, or whose server, are killed: what had come is not sent again, and no set
+// is ever another than its name says.
+
+#include <chrono>
+#include <csignal>
+#include <filesystem>
+#include <random>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <grpcpp/grpcpp.h>
+
+#include "client/client.h"
+#include "halflight/sha256.h"
+#include "halflight/v1/service.grpc.pb.h"
+#include "tests/access/health.h"
+#include "tests/process/wait_for.h"
+#include "tests/server/made_particles.h"
+#include "tests/server/upload_messages.h"
+#include "tests/soak/scenario.h"
+#include "tests/soak/scene.h"
+#include "tests/soak/server.h"
+
+namespace halflight::soak {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::Contents;
+using testing::WaitFor;
+
+// As upload_child makes them.
+client::EncodedParticles Encoded(int particles) {
+  const v1::InlineParticles set =
+      testing::MakeParticles(particles, {v1::PARTICLE_ATTRIBUTE_POSITION});
+  return {set.layout(), set.payload(), testing::Describe(set).sha256()};
+}
+
+v1::QueryUploadResponse Query(v1::RenderService::Stub& stub, const std::string& sha256) {
+  grpc::ClientContext context;
+  context.set_wait_for_ready(true);
+  v1::QueryUploadRequest request;
+  request.set_sha256(sha256);
+  v1::QueryUploadResponse response;
+  const grpc::Status status = stub.QueryUpload(&context, request, &response);
+  Require(status.ok(), "QueryUpload: " + status.error_message());
+  return response;
+}
+
+std::string FileOf(const std::string& cache, const std::string& sha256) {
+  return cache + "/" + ToHex(sha256) + ".particles";
+}
+
+// Half of it is not what was written, as after a write that the disk has lost.
+void DamageAFile(const std::string& cache) {
+  for (const auto& entry : fs::directory_iterator(cache)) {
+    if (entry.path().extension() == ".particles") {
+      fs::resize_file(entry.path(), fs::file_size(entry.path()) / 2);
+      return;
+    }
+  }
+}
+
+}  // namespace
+
+void RunUploadClientsKilled(Run& run) {
+  const testing::Folder folder;
+  const std::string cache = folder / "cache";
+  std::vector<std::string> flags = {"--cache-dir", cache};
+  if (run.sabotage) {
+    flags.insert(flags.end(), {"--partial-upload-seconds", "0"});
+  }
+  const Server server(folder, flags);
+  auto client = client::Client::Connect(server.address());
+  Require(client.status(), "connect");
+  const auto stub = v1::RenderService::NewStub(
+      grpc::CreateChannel(server.address(), grpc::InsecureChannelCredentials()));
+  std::mt19937 random(20263);
+  const auto below = [&random](size_t n) {
+    return std::uniform_int_distribution<size_t>(0, n - 1)(random);
+  };
+  const int kills = run.Of(200, 6);
+  int killed = 0;
+  size_t lost = 0;
+  size_t corrupt = 0;
+  uint64_t received = 0;
+  for (int set = 0; killed < kills; ++set) {
+    const int count = 200000 + set;  // 2.4 MB, a set of its own each time
+    const client::EncodedParticles particles = Encoded(count);
+    const uint64_t size = particles.payload.size();
+    // Once or twice: the second goes on where the first was killed.
+    uint64_t least = 0;
+    for (size_t times = 1 + below(2); times > 0; --times) {
+      testing::Process child(folder, "upload_child",
+                             {server.address(), std::to_string(count),
+                              std::to_string(1 + below(300000)), std::to_string(below(size))});
+      Require(child.Wait() == -1, "it was to be killed: " + child.Err());
+      ++killed;
+      // What was received before is kept again, once the server knows that the client is gone.
+      const bool kept =
+          WaitFor([&] { return Query(*stub, particles.sha256).committed_bytes() >= least; },
+                  std::chrono::seconds(10));
+      lost += kept ? 0 : 1;
+      const v1::QueryUploadResponse there = Query(*stub, particles.sha256);
+      Require(!there.complete() && there.committed_bytes() <= size, "part of a set, or none");
+      least = there.committed_bytes();
+    }
+    received += least;
+    Require(client->EnsureUploaded(particles), "the upload that goes on");
+    Require(Query(*stub, particles.sha256).complete(), "the set is there");
+    const std::string file = FileOf(cache, particles.sha256);
+    Require(WaitFor([&] { return fs::exists(file); }), "its file");
+    corrupt += Sha256Of(Contents(file)) == particles.sha256 ? 0 : 1;
+  }
+  const client::UploadTotals totals = client->upload_totals();
+  run.report.AtLeast("clients killed in mid-upload", killed, kills, "");
+  run.report.None("parts that the server had, and lost again", lost);
+  run.report.Tell("bytes that had come before", static_cast<double>(received) * 1e-6, " MB");
+  run.report.AtLeast("of these not sent again",
+                     100.0 * static_cast<double>(totals.saved_bytes) /
+                         static_cast<double>(std::max<uint64_t>(1, received)),
+                     90, " %");
+  run.report.None("sets on disk that are not what their name says", corrupt);
+  run.report.Holds("serves afterwards", server.Serves());
+}
+
+void RunUploadServersKilled(Run& run) {
+  const testing::Folder folder;
+  const std::string address = "unix:" + folder / "socket";
+  const std::string cache = folder / "cache";
+  const std::vector<std::string> flags = {"--address", address, "--cache-dir", cache};
+  std::vector<client::EncodedParticles> sets;
+  for (int i = 0; i < 6; ++i) {
+    sets.push_back(Encoded(100000 + i));
+  }
+  std::mt19937 random(20264);
+  const auto below = [&random](size_t n) {
+    return std::uniform_int_distribution<size_t>(0, n - 1)(random);
+  };
+  const int kills = run.Of(200, 6);
+  size_t whole = 0;
+  size_t corrupt = 0;
+  size_t others = 0;
+  for (int kill = 0; kill < kills; ++kill) {
+    Server server(folder, flags);
+    if (run.sabotage) {
+      DamageAFile(cache);
+    }
+    for (const auto& entry : fs::directory_iterator(cache)) {
+      const std::string name = entry.path().filename();
+      if (entry.path().extension() != ".particles") {
+        others += name == "halflightd.lock" ? 0 : 1;
+      } else if (name == ToHex(Sha256Of(Contents(entry.path()))) + ".particles") {
+        ++whole;
+      } else {
+        ++corrupt;
+      }
+    }
+    std::jthread client_thread([&, order = below(sets.size())] {
+      client::ClientOptions once;
+      once.timeout = std::chrono::seconds(1);
+      once.max_attempts = 1;
+      auto client = client::Client::Connect(address, once);
+      for (size_t i = 0; i < sets.size(); ++i) {
+        client->EnsureUploaded(sets[(i + order) % sets.size()]).IgnoreError();
+      }
+    });
+    std::this_thread::sleep_for(std::chrono::milliseconds(below(200)));
+    server.Signal(SIGKILL);
+    Require(server.Wait() == -1, "the server was to be killed");
+    client_thread.join();
+    // So that there is always something to write.
+    fs::remove(FileOf(cache, sets[below(sets.size())].sha256));
+  }
+
+  // What is on disk is whole: each set is there, or sent again.
+  const Server server(folder, flags);
+  const auto stub = v1::RenderService::NewStub(testing::NewChannel(address));
+  auto client = client::Client::Connect(address);
+  Require(client.status(), "connect");
+  size_t held = 0;
+  size_t drawn = 0;
+  for (const client::EncodedParticles& set : sets) {
+    held += Query(*stub, set.sha256).complete() ? 1 : 0;
+    v1::RenderFrameRequest request = SweepOf(set.sha256, 32);
+    request.mutable_scene()->mutable_material()->set_radius(0.001F);
+    drawn += client->RenderFrame(request, &set).ok() ? 1 : 0;
+  }
+  run.report.AtLeast("servers killed in mid-upload", kills, kills, "");
+  run.report.AtLeast("whole sets found by those that followed", static_cast<double>(whole), 1, "");
+  run.report.None("sets found that are not what their name says", corrupt);
+  run.report.None("files left half written after a start", others);
+  run.report.Tell("sets of 6 that the last server had", static_cast<double>(held), "");
+  run.report.AtLeast("sets of 6 drawn, sent again where they were missing",
+                     static_cast<double>(drawn), 6, "");
+}
+
+}  // namespace halflight::soak
