@@ -12,6 +12,7 @@
 #include <grpcpp/server_builder.h>
 #include <spdlog/spdlog.h>
 
+#include "grpc/health/v1/health.pb.h"
 #include "server/listen/acceptor.h"
 #include "server/render_service.h"
 
@@ -65,6 +66,8 @@ absl::StatusOr<std::unique_ptr<GrpcServer>> GrpcServer::Start(std::vector<Listen
   gpr_set_log_function(ForwardLog);
   grpc::EnableDefaultHealthCheckService(true);
   grpc::reflection::InitProtoReflectionServerBuilderPlugin();
+  // gRPC answers for health without its descriptors; named here, they are linked in for reflection.
+  grpc::health::v1::HealthCheckRequest::descriptor();
 
   auto parts = std::make_unique<Parts>(backend, access);
   grpc::ServerBuilder builder;

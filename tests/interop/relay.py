@@ -2,6 +2,7 @@
 
 import socket
 import threading
+import time
 
 
 class Cut(Exception):
@@ -9,15 +10,17 @@ class Cut(Exception):
 
 
 class CutAfter:
-    """Ends the first connection after about so many bytes; `then` is called before the next one."""
+    """Ends the first connection after about so many bytes, and a pause in which the server can take
+    what it has; `then` is called before the next connection is let through."""
 
-    def __init__(self, count, then=lambda: None):
-        self.left, self.then, self.done = count, then, False
+    def __init__(self, count, pause_s, then):
+        self.left, self.pause_s, self.then, self.done = count, pause_s, then, False
 
     def __call__(self, data):
         self.left -= len(data)
         if self.left < 0 and not self.done:
             self.done = True
+            time.sleep(self.pause_s)
             raise Cut
         return data
 
@@ -63,13 +66,16 @@ class Relay:
                 client, _ = self._listener.accept()
             except OSError:
                 return
-            self._open.wait()
-            server = socket.socket(socket.AF_UNIX)
+            threading.Thread(target=self._serve, args=(client,), daemon=True).start()
+
+    def _serve(self, client):
+        self._open.wait()
+        with client, socket.socket(socket.AF_UNIX) as server:
             server.connect(str(self._path))
-            for source, sink, hooks in ((client, server, self._to_server),
-                                        (server, client, self._to_client)):
-                threading.Thread(target=self._pump, args=(source, sink, hooks),
-                                 daemon=True).start()
+            back = threading.Thread(target=self._pump, args=(server, client, self._to_client))
+            back.start()
+            self._pump(client, server, self._to_server)
+            back.join()
 
     def _pump(self, source, sink, hooks):
         try:
