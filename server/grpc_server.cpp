@@ -13,7 +13,9 @@
 #include <grpcpp/server.h>
 #include <grpcpp/server_builder.h>
 
+#include "grpc/health/v1/health.pb.h"
 #include "halflight/v1/service.grpc.pb.h"
+#include "server/listen/acceptor.h"
 #include "server/log/log.h"
 #include "server/render_service.h"
 
@@ -81,6 +83,8 @@ absl::StatusOr<std::unique_ptr<GrpcServer>> GrpcServer::Start(std::vector<Listen
     }
     grpc::channelz::experimental::InitChannelzService();
   }
+  // gRPC answers for health without its descriptors; named here, they are linked in for reflection.
+  grpc::health::v1::HealthCheckRequest::descriptor();
 
   auto parts = std::make_unique<Parts>(backend, access);
   grpc::ServerBuilder builder;

@@ -416,13 +416,18 @@ std::string AskOnce(const std::shared_ptr<grpc::Channel>& channel, const std::st
   return bytes;
 }
 
-TEST_F(Service, ReflectionListsTheServiceAndHealth) {
+TEST_F(Service, ReflectionTellsOfTheServiceAndHealth) {
   // ServerReflectionRequest { list_services = 7: "" }.
   const std::string listed =
       AskOnce(channel_, "/grpc.reflection.v1alpha.ServerReflection/ServerReflectionInfo",
               std::string("\x3a\x00", 2));
   EXPECT_THAT(listed, HasSubstr("halflight.v1.RenderService"));
   EXPECT_THAT(listed, HasSubstr("grpc.health.v1.Health"));
+  // { file_containing_symbol = 4 }: what is listed can be called by who knows nothing else.
+  const std::string described =
+      AskOnce(channel_, "/grpc.reflection.v1alpha.ServerReflection/ServerReflectionInfo",
+              "\x22\x15grpc.health.v1.Health");
+  EXPECT_THAT(described, HasSubstr("HealthCheckResponse"));
 }
 
 // HealthCheckRequest { service = 1 }, of the whole server and of the service.

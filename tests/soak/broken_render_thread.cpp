@@ -1,6 +1,7 @@
 // StartRenderThread for a halflightd that breaks its promises, to show that the soak notices.
 // --device says how: "leaks" keeps something of each frame, more of one that was cancelled, and
-// draws other pixels after such a one; "forgets" draws other pixels each time.
+// draws other pixels after such a one; "forgets" draws other pixels each time; "deaf" draws large
+// frames for a second, whoever wants them to stop.
 
 #include "renderer/render_thread.h"
 
@@ -17,28 +18,34 @@
 namespace halflight {
 namespace {
 
+constexpr int kSmall = 256;  // pixels
+
 class BrokenRenderThread : public FrameEngine {
  public:
   explicit BrokenRenderThread(std::string fault) : fault_(std::move(fault)) {}
 
   absl::Status Submit(FrameRequest request, std::stop_token stop, Done done) override {
-    return engine_.Submit(std::move(request), stop,
-                          [this, stop, done = std::move(done)](absl::StatusOr<FrameResult> result) {
-                            std::this_thread::sleep_for(std::chrono::milliseconds(3));
-                            if (fault_ == "leaks") {
-                              Leak(stop.stop_requested());
-                            } else if (fault_ == "forgets") {
-                              ++change_;
-                            } else if (fault_ == "loses" && ++frames_ % 5 == 0) {
-                              result = absl::UnavailableError("lost");
-                            }
-                            if (result.ok()) {
-                              for (Image& image : result->images) {
-                                image.pixels[0] += static_cast<float>(change_);
-                              }
-                            }
-                            done(std::move(result));
-                          });
+    const bool large = request.scene.camera.window.width > kSmall;
+    return engine_.Submit(
+        std::move(request), stop,
+        [this, stop, large, done = std::move(done)](absl::StatusOr<FrameResult> result) {
+          std::this_thread::sleep_for(std::chrono::milliseconds(3));
+          if (fault_ == "deaf" && large) {
+            std::this_thread::sleep_for(std::chrono::seconds(1));
+          } else if (fault_ == "leaks") {
+            Leak(stop.stop_requested());
+          } else if (fault_ == "forgets") {
+            ++change_;
+          } else if (fault_ == "loses" && ++frames_ % 5 == 0) {
+            result = absl::UnavailableError("lost");
+          }
+          if (result.ok()) {
+            for (Image& image : result->images) {
+              image.pixels[0] += static_cast<float>(change_);
+            }
+          }
+          done(std::move(result));
+        });
   }
   [[nodiscard]] const DeviceInfo& device() const override { return engine_.device(); }
 

@@ -49,10 +49,12 @@ void RunCancellations(Run& run);
 void RunUploadClientsKilled(Run& run);
 void RunUploadServersKilled(Run& run);
 void RunDescriptors(Run& run);
+void RunDeviceFaults(Run& run);
 void RunDiskFull(Run& run);
 void RunMalformed(Run& run);
 void RunOverload(Run& run);
 void RunRestarts(Run& run);
+void RunStopping(Run& run);
 void RunMixedWork(Run& run);
 
 }  // namespace halflight::soak
