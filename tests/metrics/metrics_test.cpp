@@ -102,7 +102,8 @@ class BusyEngine : public testing::FakeEngine {
     return {.gl_objects = 7,
             .gl_bytes = uint64_t{5} << 32U,
             .device_resets = 3,
-            .busy_since = std::chrono::steady_clock::now() - std::chrono::minutes(2)};
+            .end = {},
+            .overdue_since = std::chrono::steady_clock::now() - std::chrono::minutes(2)};
   }
 };
 
@@ -129,7 +130,7 @@ TEST(ServerState, IsReadWhenSomebodyLooks) {
   EXPECT_EQ(page["halflight_gl_objects"], 7.0);
   EXPECT_EQ(page["halflight_gl_memory_bytes"], 5.0 * 0x1p32);
   EXPECT_EQ(page["halflight_device_resets_total"], 3.0);
-  EXPECT_GE(page["halflight_device_busy_seconds"], 120.0);
+  EXPECT_GE(page["halflight_device_overdue_seconds"], 120.0);
   EXPECT_EQ(page[R"(halflight_limit{name="max_queued_frames"})"], 11.0);
   EXPECT_EQ(
       page[R"(halflight_build_info{version="1.2.3",gl_renderer="fake",gl_version="4.5 fake"})"],
