@@ -33,11 +33,11 @@ class LogField {
   template <typename T>
   static Value Integer(T number) {
     if constexpr (std::same_as<T, bool>) {
-      return Value(number);
+      return number;
     } else if constexpr (std::signed_integral<T>) {
-      return Value(static_cast<int64_t>(number));
+      return static_cast<int64_t>(number);
     } else {
-      return Value(static_cast<uint64_t>(number));
+      return static_cast<uint64_t>(number);
     }
   }
 
