@@ -5,6 +5,7 @@
 #include <mutex>
 #include <utility>
 
+#include <grpc/grpc.h>
 #include <grpc/support/log.h>
 #include <grpcpp/ext/channelz_service_plugin.h>
 #include <grpcpp/ext/proto_server_reflection_plugin.h>
@@ -83,6 +84,9 @@ absl::StatusOr<std::unique_ptr<GrpcServer>> GrpcServer::Start(std::vector<Listen
     }
     grpc::channelz::experimental::InitChannelzService();
   }
+  // Never shut down: that would join a thread which still polls connections that have written much,
+  // for as long as 10 s after the last call (gRPC 1.51).
+  grpc_init();
   // gRPC answers for health without its descriptors; named here, they are linked in for reflection.
   grpc::health::v1::HealthCheckRequest::descriptor();
 

@@ -6,89 +6,24 @@ NODE_FOLDER has the client for Node beside its node_modules. Files are compared 
 """
 
 import base64
-import contextlib
 import hashlib
 import json
-import os
 import pathlib
-import subprocess
+import re
 import sys
 import tempfile
 import time
 import unittest
 
-HERE = pathlib.Path(__file__).resolve().parent
+from programs import HERE, ROOT, Programs, plume, said_by, wait_for
+from relay import CutAfter, FlipOnce, Relay
+
 sys.path.insert(0, str(HERE / "python"))
-
 import halflight  # noqa: E402  the client for Python, to ask servers what the others did
-from relay import CutAfter, FlipOnce, Relay  # noqa: E402
 
-ROOT = HERE.parents[1]
 NAMES = {"BEAUTY": "beauty", "COVERAGE": "coverage", "DEPTH": "depth", "LIGHT_BUFFER": "light",
          "LIGHT_TRANSMITTANCE": "transmittance"}
 EXTENSIONS = {"PNG": ".png", "EXR": ".exr", "RAW": ".raw"}
-
-
-def plume(frame):
-    return str(ROOT / f"tests/data/plume/plume.{frame:04}.ply")
-
-
-def wait_for(condition, seconds=60):
-    """Whether it came true within that time."""
-    end = time.monotonic() + seconds
-    while not condition():
-        if time.monotonic() > end:
-            return False
-        time.sleep(0.02)
-    return True
-
-
-@contextlib.contextmanager
-def halflightd(folder, *flags):
-    """A server on a unix socket in `folder`; its log is there too."""
-    with open(folder / "log", "wb") as log:
-        server = subprocess.Popen([BIN / "halflightd", "--address", f"unix:{folder}/socket", *flags],
-                                  stderr=log)
-    try:
-        if not wait_for(lambda: b"listening" in (folder / "log").read_bytes()):
-            raise RuntimeError((folder / "log").read_text())
-        yield f"unix:{folder}/socket"
-    finally:
-        server.terminate()
-        code = server.wait()
-    if code != 0:
-        raise RuntimeError(f"halflightd ended with {code}: {(folder / 'log').read_text()}")
-
-
-def environment(token):
-    own = {"HALFLIGHT_PROTOS": str(ROOT / "proto"), "PYTHONDONTWRITEBYTECODE": "1"}
-    return {**os.environ, **own, **({"HALFLIGHT_TOKEN": token} if token else {})}
-
-
-def start_client(address, *arguments, token=None):
-    return subprocess.Popen([*CLIENT, address, *map(str, arguments)], env=environment(token),
-                            stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
-
-
-def call_client(address, *arguments, token=None):
-    """What the independent client says."""
-    return said_by(start_client(address, *arguments, token=token))
-
-
-def said_by(process):
-    try:
-        out, err = process.communicate(timeout=120)
-    finally:
-        process.kill()
-        process.wait()
-    if process.returncode != 0:
-        raise RuntimeError(err.decode())
-    return json.loads(out)
-
-
-def cpp_client(*arguments):
-    return subprocess.run([BIN / "halflight", "render", "--quiet", *map(str, arguments)],
-                          capture_output=True, text=True, timeout=300, check=False)
 
 
 class Interop(unittest.TestCase):
@@ -133,6 +68,19 @@ class Interop(unittest.TestCase):
         self.assertEqual([hashlib.sha256(each).hexdigest() for each in expected],
                          [hashlib.sha256(each).hexdigest() for each in got])
         self.assertTrue(all(len(each) > 1000 for each in expected))
+
+    def test_manual_shows_the_code_of_the_clients(self):
+        """docs/clients.md: the lines of each block stand in one of the files, but for indents."""
+        def lines_of(text):
+            return [line.strip() for line in text.splitlines() if line.strip()]
+        sources = ["\n".join(lines_of(path.read_text()))
+                   for path in [*HERE.glob("python/*.py"), *HERE.glob("node/*.mjs")]]
+        blocks = re.findall(r"^```\w+\n(.*?)^```$", (ROOT / "docs/clients.md").read_text(),
+                            re.DOTALL | re.MULTILINE)
+        self.assertGreater(len(blocks), 5)
+        for block in blocks:
+            wanted = "\n".join(lines_of(block))
+            self.assertTrue(any(wanted in source for source in sources), block)
 
     def test_server_says_it_is_well(self):
         self.assertEqual(call_client(self.address, "health"), {"status": "SERVING"})
@@ -292,8 +240,7 @@ class Interop(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    name, BIN, *folder = sys.argv[1:]
-    BIN = pathlib.Path(BIN)
-    CLIENT = {"python": lambda: [sys.executable, HERE / "python/main.py"],
-              "node": lambda: ["node", pathlib.Path(*folder) / "main.mjs"]}[name]()
-    unittest.main(argv=[f"interop_test.py {name}"], verbosity=2)
+    programs = Programs(*sys.argv[1:])
+    halflightd, start_client = programs.halflightd, programs.start_client
+    call_client, cpp_client = programs.call_client, programs.cpp_client
+    unittest.main(argv=[f"interop_test.py {sys.argv[1]}"], verbosity=2)

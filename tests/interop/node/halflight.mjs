@@ -166,9 +166,7 @@ export class Client {
 
   // The stream of responses: to be read by frames(), or to be cancelled.
   startRender(request) {
-    const { particle_sha256: sha256 } = request.scene;
-    return this.service.RenderFrame(request, this.metadata(sha256 && Buffer.from(sha256, 'base64')),
-      options());
+    return this.service.RenderFrame(request, this.metadata(nameIn(request)), options());
   }
 
   // { header, outputs } of one frame.
@@ -181,7 +179,7 @@ export class Client {
 
   // Yields what render() gives, for each request in turn.
   async* renderSequence(requests) {
-    const stream = this.service.RenderSequence(this.metadata(), options());
+    const stream = this.service.RenderSequence(this.metadata(nameIn(requests[0])), options());
     Readable.from(requests.map((frame) => ({ frame }))).pipe(stream);
     let count = 0;
     for await (const frame of frames(stream)) {
@@ -210,6 +208,11 @@ export class Client {
     }
     return said;
   }
+}
+
+// The particle set's name: bytes, or base64 as protobuf JSON has them.
+function nameIn({ scene: { particle_sha256: sha256 } }) {
+  return sha256 && Buffer.from(sha256, 'base64');
 }
 
 function options() {
