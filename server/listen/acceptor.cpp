@@ -137,8 +137,9 @@ class Acceptor::Loop {
     const uint64_t one = 1;
     [[maybe_unused]] const auto written = write(wake_, &one, sizeof(one));
   }
-  // After Run has returned.
+  // After Run has returned, as the next.
   void Close() { sockets_.clear(); }
+  Connections& connections() { return connections_; }
 
  private:
   // False where it is of no use to try again at once.
@@ -232,6 +233,16 @@ void Acceptor::Stop() {
     loop_->Stop();
     thread_.join();
     loop_->Close();
+  }
+}
+
+void Acceptor::HangUp(std::chrono::milliseconds at_most) {
+  constexpr std::chrono::milliseconds kLookAgain{1};
+  const auto until = std::chrono::steady_clock::now() + at_most;
+  Stop();
+  loop_->connections().HangUp();
+  while (loop_->connections().Count() > 0 && std::chrono::steady_clock::now() < until) {
+    std::this_thread::sleep_for(kLookAgain);
   }
 }
 
