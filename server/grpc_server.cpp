@@ -136,6 +136,11 @@ absl::StatusOr<std::unique_ptr<GrpcServer>> GrpcServer::Start(
 }
 
 GrpcServer::~GrpcServer() {
+  // Not left to gRPC: it ends calls that reach it from now on with CANCELLED, which clients do not
+  // take for a reason to try elsewhere; a lost connection is UNAVAILABLE.
+  if (parts_->acceptor != nullptr) {
+    parts_->acceptor->HangUp(kShutdownGrace);
+  }
   parts_->acceptor.reset();
   parts_->server->Shutdown(std::chrono::system_clock::now() + kShutdownGrace);
   parts_->server->Wait();

@@ -145,6 +145,11 @@ class Acceptor::Loop {
   // After Run has returned.
   void Close() { sockets_.clear(); }
 
+  void HangUp() {
+    const std::lock_guard lock(mutex_);
+    connections_.HangUp();
+  }
+
   ConnectionCounts Counts() {
     const std::lock_guard lock(mutex_);
     return {.open = connections_.Count(), .accepted = accepted_, .refused = complaint_.refused()};
@@ -255,6 +260,15 @@ void Acceptor::Stop() {
 }
 
 ConnectionCounts Acceptor::counts() const { return loop_->Counts(); }
+void Acceptor::HangUp(std::chrono::milliseconds at_most) {
+  constexpr std::chrono::milliseconds kLookAgain{1};
+  const auto until = std::chrono::steady_clock::now() + at_most;
+  Stop();
+  loop_->HangUp();
+  while (loop_->Counts().open > 0 && std::chrono::steady_clock::now() < until) {
+    std::this_thread::sleep_for(kLookAgain);
+  }
+}
 
 uint32_t RoomForConnections() {
   rlimit limit{};

@@ -1,8 +1,9 @@
 // The loop that accepts connections and hands them on. gRPC 1.51 gives its own listener up for good
 // the first time that descriptors run out; this one turns those away that it has no room for, and
-// goes on. Speaks no protocol.
+// goes on; at the end it hangs up. Speaks no protocol.
 #pragma once
 
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -43,6 +44,10 @@ class Acceptor {
 
   // Looks at every connection. Any thread.
   [[nodiscard]] ConnectionCounts counts() const;
+
+  // Stops, receives nothing more from those connected, and waits until whoever serves them has
+  // closed their connections, at most that long: a peer finds its connection lost.
+  void HangUp(std::chrono::milliseconds at_most);
 
  private:
   class Loop;

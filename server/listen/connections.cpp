@@ -34,4 +34,11 @@ size_t Connections::Count() {
   return cookies_.size();
 }
 
+void Connections::HangUp() {
+  Count();
+  for (const auto& [fd, cookie] : cookies_) {
+    shutdown(fd, SHUT_RD);
+  }
+}
+
 }  // namespace halflight

@@ -26,6 +26,10 @@ class Connections {
   // Looks at each.
   size_t Count();
 
+  // Nothing more is received over those that are open: who serves them finds that their peers are
+  // gone, and closes them.
+  void HangUp();
+
  private:
   std::unordered_map<int, uint64_t> cookies_;  // by descriptor
   std::chrono::steady_clock::time_point looked_;

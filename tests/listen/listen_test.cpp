@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <atomic>
+#include <chrono>
 #include <memory>
 #include <mutex>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include <fcntl.h>
@@ -45,6 +47,14 @@ class Served {
   [[nodiscard]] size_t size() const {
     const std::lock_guard lock(mutex_);
     return fds_.size();
+  }
+  // Whether the first one's peer seems to be gone within a minute; closes all then.
+  bool ReadsTheEnd() {
+    pollfd polled{.fd = fds_.front(), .events = POLLIN, .revents = 0};
+    char byte = 0;
+    const bool end = poll(&polled, 1, 60000) == 1 && recv(polled.fd, &byte, 1, 0) == 0;
+    DropAll();
+    return end;
   }
 
  private:
@@ -161,6 +171,25 @@ TEST_F(AcceptorTest, StoppedNobodyConnectsAndThoseInsideStay) {
   acceptor_->Stop();
   EXPECT_FALSE(ClientSocket().Connect(address_));
   EXPECT_FALSE(inside.HangsUpWithin(50));
+}
+
+TEST_F(AcceptorTest, HangingUpEndsThoseInsideAndWaitsForTheirServer) {
+  Listen(10);
+  const ClientSocket inside = Connect();
+  ASSERT_TRUE(WaitFor([this] { return served_.size() == 1; }));
+  std::jthread server([this] { EXPECT_TRUE(served_.ReadsTheEnd()); });
+  acceptor_->HangUp(std::chrono::minutes(1));
+  server.join();
+  EXPECT_TRUE(inside.HangsUpWithin(10000));
+  EXPECT_FALSE(ClientSocket().Connect(address_));
+}
+
+TEST_F(AcceptorTest, HangingUpDoesNotWaitForEver) {
+  Listen(10);
+  const ClientSocket inside = Connect();
+  ASSERT_TRUE(WaitFor([this] { return served_.size() == 1; }));
+  acceptor_->HangUp(std::chrono::milliseconds(10));  // nobody closes it
+  EXPECT_EQ(served_.size(), 1U);
 }
 
 TEST(Connections, CountWhatIsOpenWhoeverHasTheDescriptorsNow) {

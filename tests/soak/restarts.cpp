@@ -4,6 +4,7 @@
 #include <atomic>
 #include <chrono>
 #include <csignal>
+#include <iostream>
 #include <map>
 #include <mutex>
 #include <random>
@@ -27,7 +28,7 @@ constexpr int kClients = 4;
 struct Seen {
   bool whole = false;
   int messages = 0;
-  grpc::StatusCode code = grpc::StatusCode::UNKNOWN;
+  grpc::Status status{};
 };
 
 class Clients {
@@ -68,7 +69,7 @@ class Clients {
         const std::lock_guard lock(mutex_);
         seen_[request.request_id()] = {.whole = call->status().ok() && call->whole(),
                                        .messages = call->messages(),
-                                       .code = call->status().error_code()};
+                                       .status = call->status()};
       }
       whole_ += call->whole() ? 1 : 0;
       if (!call->status().ok()) {
@@ -139,7 +140,12 @@ void RunRestarts(Run& run) {
       losses.whole += frame.whole ? 1 : 0;
       losses.unfinished += !frame.whole && frame.messages > 0 ? 1 : 0;
       if (!frame.whole && frame.messages == 0) {
-        ++(frame.code == grpc::StatusCode::UNAVAILABLE ? losses.refused : losses.otherwise);
+        const bool refused = frame.status.error_code() == grpc::StatusCode::UNAVAILABLE;
+        ++(refused ? losses.refused : losses.otherwise);
+        if (!refused) {
+          std::cerr << "soak: " << id << ": " << frame.status.error_code() << " "
+                    << frame.status.error_message() << std::endl;
+        }
       }
     }
     ReadLog(server.Err(), seen, losses);
