@@ -1,7 +1,10 @@
 #include "client/cli/info_command.h"
 
 #include <fmt/format.h>
+#include <google/protobuf/descriptor.h>
+#include <google/protobuf/message.h>
 
+#include <cstdint>
 #include <string>
 
 #include "absl/strings/ascii.h"
@@ -18,6 +21,20 @@ std::string ShortName(const std::string& enumerator, size_t prefix) {
   return absl::AsciiStrToLower(enumerator.size() > prefix ? enumerator.substr(prefix) : enumerator);
 }
 
+// All of them, under the names that docs/operations.md and requests' errors use.
+void PrintLimits(const v1::ServerLimits& limits) {
+  const google::protobuf::Descriptor& fields = *limits.GetDescriptor();
+  const google::protobuf::Reflection& values = *limits.GetReflection();
+  fmt::print("limits:\n");
+  for (int i = 0; i < fields.field_count(); ++i) {
+    const google::protobuf::FieldDescriptor& field = *fields.field(i);
+    const bool wide = field.cpp_type() == google::protobuf::FieldDescriptor::CPPTYPE_UINT64;
+    const uint64_t value =
+        wide ? values.GetUInt64(limits, &field) : values.GetUInt32(limits, &field);
+    fmt::print("  {} {}\n", field.name(), value);
+  }
+}
+
 void Print(const v1::GetServerInfoResponse& info) {
   std::string techniques;
   for (const int technique : info.techniques()) {
@@ -31,22 +48,10 @@ void Print(const v1::GetServerInfoResponse& info) {
   for (const int format : info.formats()) {
     formats += " " + ShortName(v1::ImageFormat_Name(format), 13);
   }
-  const v1::ServerLimits& limits = info.limits();
   fmt::print("halflightd {}\nrenderer: {}\nOpenGL: {}\ntechniques:{}\noutputs:{}\nformats:{}\n",
              info.server_version(), info.gl_renderer(), info.gl_version(), techniques, outputs,
              formats);
-  fmt::print(
-      "limits: {} particles, {} bytes a set, {} bytes of sets\n"
-      "        image side {}, light buffer {}, slices {}, lights {}, outputs {}\n"
-      "        {} bytes of output, {} bytes a message, {} frames queued\n"
-      "        {} samples times particles of the reference\n"
-      "        {} connections of {} calls each, {} s to connect, {} s without a call\n",
-      limits.max_particles(), limits.max_particle_bytes(), limits.max_cache_bytes(),
-      limits.max_image_size(), limits.max_light_buffer_size(), limits.max_slices(),
-      limits.max_lights(), limits.max_outputs(), limits.max_output_bytes(),
-      limits.max_message_bytes(), limits.max_queued_frames(), limits.max_reference_work(),
-      limits.max_connections(), limits.max_connection_streams(), limits.max_handshake_seconds(),
-      limits.max_idle_seconds());
+  PrintLimits(info.limits());
 }
 
 }  // namespace

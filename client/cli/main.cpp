@@ -31,7 +31,9 @@ namespace {
 std::string UsageMessage(const CLI::App& app, const CLI::ParseError& error) {
   const std::vector<std::string> extras = app.remaining(true);
   if (extras.empty()) {
-    return error.what();
+    return app.get_subcommands().empty()
+               ? "command: none is given; allowed: render, info (halflight render --help)"
+               : error.what();
   }
   if (app.get_subcommands().empty()) {
     return fmt::format("command: is '{}'; allowed: render, info", extras.front());

@@ -40,7 +40,7 @@ TEST(Program, NamesWhatItDoesNotKnow) {
     const char* text;
   };
   for (const Case& bad : {
-           Case{"", "A subcommand is required"},
+           Case{"", "command: none is given; allowed: render, info"},
            Case{"rendr a.ply", "command: is 'rendr'; allowed: render, info"},
            Case{"render a.ply --ouput b.png", "--ouput: is no flag"},
            Case{"render a.ply b.ply -o c.png", "input: 'b.ply' is one too many"},

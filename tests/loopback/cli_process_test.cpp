@@ -160,6 +160,16 @@ TEST(Cli, InfoAsJsonIsTheServersAnswer) {
   ExpectNothingLeft(folder);
 }
 
+TEST(Cli, InfoPrintsEveryLimit) {
+  const Folder folder;
+  const Ended ended = RunHalflight(folder, {"info"});
+  ASSERT_EQ(ended.code, 0) << ended.err;
+  for (const char* limit : {"max_particles 50000000\n", "max_frame_seconds 600\n",
+                            "max_client_frames 48\n", "max_cache_dir_bytes 0\n"}) {
+    EXPECT_THAT(ended.out, HasSubstr(limit));
+  }
+}
+
 TEST(Cli, MalformedFileIsToldByPlaceAndNothingIsStarted) {
   const Folder folder;
   const std::string whole = Contents(PlumePath("0024"));
