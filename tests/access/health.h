@@ -35,7 +35,7 @@ inline Answer CallRaw(const std::shared_ptr<grpc::Channel>& channel, const std::
   bool ok = false;
   queue.Next(&tag, &ok);
   grpc::Slice whole;
-  if (answer.status.ok() && bytes.TrySingleSlice(&whole).ok()) {
+  if (answer.status.ok() && bytes.DumpToSingleSlice(&whole).ok()) {
     answer.bytes.assign(reinterpret_cast<const char*>(whole.begin()), whole.size());
   }
   return answer;

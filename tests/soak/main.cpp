@@ -83,15 +83,16 @@ bool RunOne(const Scenario& scenario, const Options& options, const std::string&
     return Missed(scenario, rows);
   }
   if (!options.page.empty()) {
-    const absl::Status status = PutOnPage(
-        options.page,
-        {.scenario = std::string(scenario.name),
-         .what = std::string(scenario.what),
-         .sabotage = std::string(scenario.sabotage),
-         .rows = rows,
-         .made = fmt::format("{}, {}, {} s, {}; {}, {} cores; GL renderer {}", measure::Today(),
-                             options.revision, Digits(std::round(took.count())), others,
-                             measure::CpuModel(), std::thread::hardware_concurrency(), renderer)});
+    const absl::Status status =
+        PutOnPage(options.page,
+                  {.scenario = std::string(scenario.name),
+                   .what = std::string(scenario.what),
+                   .sabotage = std::string(scenario.sabotage),
+                   .rows = rows,
+                   .made = fmt::format(
+                       "{} of revision {} in {} s, in which {}; {}, {} cores; GL renderer {}",
+                       measure::Today(), options.revision, Digits(std::round(took.count())), others,
+                       measure::CpuModel(), std::thread::hardware_concurrency(), renderer)});
     if (!status.ok()) {
       std::cerr << "soak: " << status << "\n";
       return false;

@@ -225,10 +225,10 @@ void RunMalformed(Run& run) {
   size_t wrongly_ok = 0;
   size_t late = 0;
   double before = server.Megabytes();
-  // The first round warms the server up.
+  // The first rounds fill what is kept of uploads.
   const int rounds = run.sabotage ? 1 : run.Of(50, 2);
   for (int round = 0; round < rounds; ++round) {
-    if (round == 1) {
+    if (round == std::max(1, rounds / 5)) {
       if (!run.short_form) {
         server.Rest();
       }

@@ -25,9 +25,9 @@ absl::Status PutOnPage(const std::string& path, const Outcome& outcome) {
   std::ostringstream before;
   before << std::ifstream(path).rdbuf();
   std::string block = fmt::format(
-      "\n### {}\n\n{}. {}. Shown to fail with {}.\n\n"
+      "\n### {}\n\n{}. Shown to fail with {}. Made {}.\n\n"
       "| scenario | property | reached | bound | ok |\n|---|---|---|---|---|\n",
-      outcome.scenario, outcome.what, outcome.made, outcome.sabotage);
+      outcome.scenario, outcome.what, outcome.sabotage, outcome.made);
   for (const Row& row : outcome.rows) {
     block += LineOf(outcome.scenario, row) + "\n";
   }
