@@ -28,6 +28,9 @@ struct FrameRequest {
   // Whether work that earlier frames left may be used, and left to later ones; the images are the
   // same. False where times of frames are compared.
   bool reuse = true;
+  // Whether no other frame may be in flight with it, so that it alone is to blame for what happens
+  // to the device.
+  bool alone = false;
 };
 
 // What a tool needs to place one light's buffer in the world; see LightInfo in frame.proto.

@@ -1,6 +1,9 @@
 #include "renderer/frame_renderer.h"
 
+#include <epoxy/gl.h>
+
 #include <algorithm>
+#include <thread>
 #include <utility>
 
 #include "renderer/frame_images.h"
@@ -28,7 +31,10 @@ void MarkReused(const std::vector<PlannedPass>& reused, FramePlan& plan) {
 
 FrameRenderer::FrameRenderer(std::unique_ptr<gl::EglContext> context,
                              const FrameRendererOptions& options)
-    : context_(std::move(context)), device_(context_->device()), cache_(options.max_reuse_bytes) {
+    : context_(std::move(context)),
+      device_(context_->device()),
+      cache_(options.max_reuse_bytes),
+      faults_(options.faults) {
   device_.max_texture_size = std::min(device_.max_texture_size, options.max_texture_size);
   const int by_device = device_.software ? 1 : 2;
   frames_in_flight_ =
@@ -57,12 +63,44 @@ absl::StatusOr<std::unique_ptr<FrameRenderer::Begun>> FrameRenderer::Begin(Frame
   SliceCompositor& compositor = frame->request.scene.shadow.compositor;
   compositor = CompositorFor(compositor, device().software);
   frame->stop = std::move(stop);
-  if (absl::Status status = Record(*frame); !status.ok()) {
+  const absl::Status status = Record(*frame);
+  // Whatever else went wrong comes of that.
+  if (absl::Status reset = CheckReset(); !reset.ok()) return reset;
+  if (!status.ok()) {
     // What it left behind is no other frame's.
     gl::ForgetErrors();
     return status;
   }
   return frame;
+}
+
+absl::Status FrameRenderer::CheckReset() {
+  // The driver says so once.
+  if (const GLenum status = glGetGraphicsResetStatus(); reset_.ok() && status != GL_NO_ERROR) {
+    const bool suspect = status == GL_GUILTY_CONTEXT_RESET || status == GL_UNKNOWN_CONTEXT_RESET;
+    reset_ = DeviceResetError(!suspect);
+  }
+  return reset_;
+}
+
+absl::StatusOr<DrawnFrame> FrameRenderer::Draw(const ShadowTechnique& technique,
+                                               const DrawContext& context) {
+  switch (faults_ == nullptr ? DeviceFault::kNone : faults_->Next()) {
+    case DeviceFault::kNone:
+      break;
+    case DeviceFault::kReset:
+    case DeviceFault::kGone:
+      reset_ = DeviceResetError(false);
+      break;
+    case DeviceFault::kInnocentReset:
+      reset_ = DeviceResetError(true);
+      break;
+    case DeviceFault::kOutOfMemory:
+      return absl::ResourceExhaustedError("planned: the device is out of memory");
+    case DeviceFault::kHang:
+      for (;;) std::this_thread::sleep_for(std::chrono::hours(1));
+  }
+  return technique.Draw(context);
 }
 
 absl::Status FrameRenderer::Record(Begun& frame) {
@@ -90,7 +128,7 @@ absl::Status FrameRenderer::Record(Begun& frame) {
                             .stop = frame.stop,
                             .staging = frames_in_flight_ > 1 ? &staging_ : nullptr};
   const ShadowTechnique& technique = TechniqueFor(scene.shadow.technique);
-  absl::StatusOr<DrawnFrame> drawn = technique.Draw(context);
+  absl::StatusOr<DrawnFrame> drawn = Draw(technique, context);
   if (absl::IsResourceExhausted(drawn.status()) && (!cache_.empty() || frames_in_flight_ > 1)) {
     // What was kept may be what there is no room beside, or what frames in flight hold: until the
     // device is through with them, and with what they dropped.
@@ -98,7 +136,7 @@ absl::Status FrameRenderer::Record(Begun& frame) {
     staging_.Clear();
     if (frames_in_flight_ > 1) glFinish();
     gl::ForgetErrors();
-    drawn = technique.Draw(context);
+    drawn = Draw(technique, context);
   }
   if (!drawn.ok()) return drawn.status();
   frame.drawn = *std::move(drawn);
@@ -113,14 +151,18 @@ bool FrameRenderer::DrawsOnDevice(const FrameRequest& request) const {
 }
 
 bool FrameRenderer::CanFinish(const Begun& frame, std::chrono::nanoseconds wait) const {
-  if (frame.drawn.arriving == nullptr || frame.stop.stop_requested()) return true;
-  return frame.drawn.arriving->readback.Arrived(wait);
+  return frame.stop.stop_requested() || IsDrawn(frame, wait);
+}
+
+bool FrameRenderer::IsDrawn(const Begun& frame, std::chrono::nanoseconds wait) {
+  return frame.drawn.arriving == nullptr || frame.drawn.arriving->readback.Arrived(wait);
 }
 
 absl::StatusOr<FrameResult> FrameRenderer::Finish(std::unique_ptr<Begun> frame) {
   if (frame->drawn.arriving != nullptr) frame->clock.BeginCpu("readback");
   while (!CanFinish(*frame, kPatience)) {
   }
+  if (absl::Status reset = CheckReset(); !reset.ok()) return reset;
   if (frame->stop.stop_requested()) {
     gl::ForgetErrors();
     return absl::CancelledError("frame cancelled");

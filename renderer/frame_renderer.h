@@ -10,6 +10,7 @@
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
+#include "renderer/device_fault.h"
 #include "renderer/frame.h"
 #include "renderer/frame_cache.h"
 #include "renderer/frame_engine.h"
@@ -31,6 +32,7 @@ struct FrameRendererOptions {
   // Of which one is read back while the device draws the others; one: every frame is read back as
   // soon as it is drawn. 0: two on GPUs, one on CPU rasterisers, which draw when told to.
   int frames_in_flight = 0;
+  std::shared_ptr<PlannedFaults> faults{};  // of tests; null: none
 };
 
 class FrameRenderer {
@@ -52,9 +54,9 @@ class FrameRenderer {
 
   // Both halves of a frame. Errors: InvalidArgument where the technique cannot do what is asked,
   // Cancelled soon after `stop` was requested, ResourceExhausted when the device is out of memory,
-  // Internal for a fault of GL or of a shader. The renderer stays usable after each of them. A
-  // frame has the same images whatever was rendered before it; a particle set must not change once
-  // it has been rendered.
+  // Internal for a fault of GL or of a shader. The renderer stays usable after each of them; only
+  // after one of device_fault.h it is lost. A frame has the same images whatever was rendered
+  // before it; a particle set must not change once it has been rendered.
   absl::StatusOr<FrameResult> Render(const FrameRequest& request, const std::stop_token& stop);
 
   // The first half: plans the frame, uploads what it needs, and records what the device shall do
@@ -65,8 +67,14 @@ class FrameRenderer {
   // Whether the second half need not wait for the device, or only finds that it was cancelled.
   // Waits for that itself, at most for so long.
   [[nodiscard]] bool CanFinish(const Begun& frame, std::chrono::nanoseconds wait) const;
+  // Whether the device has come to the frame's end, or to its own; waits at most for so long. One
+  // that was cancelled may still be drawn.
+  [[nodiscard]] static bool IsDrawn(const Begun& frame, std::chrono::nanoseconds wait);
   // The second half: waits for the device where it must, and takes over what it has copied.
   absl::StatusOr<FrameResult> Finish(std::unique_ptr<Begun> frame);
+
+  // OK, or that the device was reset: the renderer is of no use any more.
+  absl::Status CheckReset();
 
   // As many frames as are worth having begun at once.
   [[nodiscard]] size_t frames_in_flight() const { return frames_in_flight_; }
@@ -83,6 +91,8 @@ class FrameRenderer {
 
   // Begins `frame`, of which request and stop are set.
   absl::Status Record(Begun& frame);
+  // Draws, unless a fault is planned.
+  absl::StatusOr<DrawnFrame> Draw(const ShadowTechnique& technique, const DrawContext& context);
 
   std::unique_ptr<gl::EglContext> context_;
   DeviceInfo device_;
@@ -91,6 +101,8 @@ class FrameRenderer {
   FrameCache cache_;
   gl::StagingMemory staging_;
   size_t frames_in_flight_;
+  std::shared_ptr<PlannedFaults> faults_;
+  absl::Status reset_;
 };
 
 }  // namespace halflight

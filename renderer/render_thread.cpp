@@ -1,7 +1,9 @@
 #include "renderer/render_thread.h"
 
+#include <algorithm>
 #include <chrono>
 #include <condition_variable>
+#include <cstdint>
 #include <deque>
 #include <future>
 #include <mutex>
@@ -11,6 +13,9 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "renderer/device_restart.h"
+#include "renderer/gl/object.h"
+#include "renderer/stop_times.h"
 #include "renderer/warm_up.h"
 
 namespace halflight {
@@ -18,6 +23,9 @@ namespace halflight {
 namespace {
 
 using Clock = std::chrono::steady_clock;
+
+// How soon the thread looks again while the device works.
+constexpr std::chrono::milliseconds kPatience(1);
 
 class RenderThread : public FrameEngine {
  public:
@@ -31,6 +39,8 @@ class RenderThread : public FrameEngine {
 
   absl::Status Submit(FrameRequest request, std::stop_token stop, Done done) override;
   [[nodiscard]] const DeviceInfo& device() const override { return device_; }
+  [[nodiscard]] int frames_in_flight() const override { return frames_in_flight_; }
+  [[nodiscard]] EngineState state() const override;
 
  private:
   struct Job {
@@ -43,38 +53,52 @@ class RenderThread : public FrameEngine {
   // A job whose frame was begun, or failed to be.
   struct Flight {
     Job job;  // without its request
+    bool alone = false;
     double queued_ms = 0.0;
+    std::unique_ptr<StopTimes::Frame> watched;
     absl::StatusOr<std::unique_ptr<FrameRenderer::Begun>> frame;
   };
 
-  void Run(std::promise<absl::StatusOr<DeviceInfo>> started);
-  void Serve(FrameRenderer& renderer);
+  // Frames that were begun, the oldest first, and cancelled ones that the device still draws.
+  struct Flights {
+    std::deque<Flight> frames;
+    std::deque<Flight> cancelled;
+  };
+
+  void Run(std::promise<absl::Status> started);
+  // Until the engine stops, or with an error once the device was reset.
+  absl::Status Serve(FrameRenderer& renderer);
+  // From now on there are no frames.
+  void End(const absl::Status& why);
   void WarmUp(FrameRenderer& renderer);
-  // The next job. `idle`: waits for it; none when stopping and none is left. Otherwise none where
-  // none is there, or where it would keep frames in flight waiting.
-  std::optional<Job> NextJob(const FrameRenderer& renderer, bool idle);
-  static Flight Begin(FrameRenderer& renderer, Job job);
-  void Finish(FrameRenderer& renderer, Flight flight);
+  // The next job, if it may be begun beside these. Waits for one where none is in flight; none when
+  // stopping and none is left.
+  std::optional<Job> NextJob(const FrameRenderer& renderer, const Flights& flights);
+  Flight Begin(FrameRenderer& renderer, Job job);
+  void Finish(FrameRenderer& renderer, Flights& flights);
+  void Answer(Flight& flight, absl::StatusOr<FrameResult> frame);
 
   const RenderThreadOptions options_;
-  DeviceInfo device_;
-  std::mutex mutex_;
+  DeviceInfo device_;         // set before the engine serves
+  int frames_in_flight_ = 1;  // as well
+  mutable std::mutex mutex_;
   std::condition_variable changed_;
-  std::deque<Job> jobs_;              // guarded by mutex_
-  int unfinished_ = 0;                // guarded by mutex_: waiting or rendering
-  bool stopping_ = false;             // guarded by mutex_
+  std::deque<Job> jobs_;                                  // guarded by mutex_
+  int unfinished_ = 0;                                    // guarded by mutex_: waiting or rendering
+  bool stopping_ = false;                                 // guarded by mutex_
+  absl::Status end_;                                      // guarded by mutex_
+  std::optional<Clock::time_point> starting_anew_since_;  // guarded by mutex_
+  uint64_t resets_ = 0;                                   // guarded by mutex_
+  StopTimes stop_times_;
   std::deque<FrameRequest> warm_up_;  // of the thread's own
   std::thread thread_;
 };
 
 absl::Status RenderThread::Start() {
-  std::promise<absl::StatusOr<DeviceInfo>> promise;
-  std::future<absl::StatusOr<DeviceInfo>> started = promise.get_future();
+  std::promise<absl::Status> promise;
+  std::future<absl::Status> started = promise.get_future();
   thread_ = std::thread(&RenderThread::Run, this, std::move(promise));
-  const absl::StatusOr<DeviceInfo> info = started.get();
-  if (!info.ok()) return info.status();
-  device_ = *info;
-  return absl::OkStatus();
+  return started.get();
 }
 
 RenderThread::~RenderThread() {
@@ -89,6 +113,7 @@ RenderThread::~RenderThread() {
 absl::Status RenderThread::Submit(FrameRequest request, std::stop_token stop, Done done) {
   {
     const std::lock_guard lock(mutex_);
+    if (!end_.ok()) return end_;
     if (stopping_) return absl::UnavailableError("the renderer is shutting down");
     if (unfinished_ >= options_.max_queued_frames) {
       return absl::ResourceExhaustedError(absl::StrCat("frame queue: ", unfinished_,
@@ -102,11 +127,39 @@ absl::Status RenderThread::Submit(FrameRequest request, std::stop_token stop, Do
   return absl::OkStatus();
 }
 
-std::optional<RenderThread::Job> RenderThread::NextJob(const FrameRenderer& renderer, bool idle) {
+EngineState RenderThread::state() const {
+  const gl::Held held = gl::HeldMemory();
+  EngineState state{.gl_objects = held.objects,
+                    .gl_bytes = held.bytes,
+                    .device_resets = 0,
+                    .end = {},
+                    .overdue_since = stop_times_.first()};
+  const std::lock_guard lock(mutex_);
+  state.device_resets = resets_;
+  state.end = end_;
+  if (starting_anew_since_) {
+    state.overdue_since =
+        std::min(state.overdue_since.value_or(*starting_anew_since_), *starting_anew_since_);
+  }
+  return state;
+}
+
+std::optional<RenderThread::Job> RenderThread::NextJob(const FrameRenderer& renderer,
+                                                       const Flights& flights) {
   std::unique_lock lock(mutex_);
-  if (idle) changed_.wait(lock, [&] { return stopping_ || !jobs_.empty(); });
+  const auto ready = [&] { return stopping_ || !jobs_.empty(); };
+  if (!flights.frames.empty()) {
+    // One that the CPU draws would keep them waiting.
+    if (jobs_.empty() || jobs_.front().request.alone || flights.frames.front().alone ||
+        !renderer.DrawsOnDevice(jobs_.front().request)) {
+      return std::nullopt;
+    }
+  } else if (flights.cancelled.empty()) {
+    changed_.wait(lock, ready);
+  } else {
+    changed_.wait_for(lock, kPatience, ready);
+  }
   if (jobs_.empty()) return std::nullopt;
-  if (!idle && !renderer.DrawsOnDevice(jobs_.front().request)) return std::nullopt;
   Job job = std::move(jobs_.front());
   jobs_.pop_front();
   return job;
@@ -114,17 +167,16 @@ std::optional<RenderThread::Job> RenderThread::NextJob(const FrameRenderer& rend
 
 RenderThread::Flight RenderThread::Begin(FrameRenderer& renderer, Job job) {
   const std::chrono::duration<double, std::milli> waited = Clock::now() - job.submitted;
-  if (job.stop.stop_requested()) {
-    return {std::move(job), waited.count(), absl::CancelledError("frame cancelled")};
-  }
-  auto frame = renderer.Begin(std::move(job.request), job.stop);
-  return {std::move(job), waited.count(), std::move(frame)};
+  Flight flight{std::move(job), false, waited.count(), nullptr,
+                absl::CancelledError("frame cancelled")};
+  if (flight.job.stop.stop_requested()) return flight;
+  flight.alone = flight.job.request.alone;
+  flight.watched = stop_times_.Watch(flight.job.stop);
+  flight.frame = renderer.Begin(std::move(flight.job.request), flight.job.stop);
+  return flight;
 }
 
-void RenderThread::Finish(FrameRenderer& renderer, Flight flight) {
-  absl::StatusOr<FrameResult> frame =
-      flight.frame.ok() ? renderer.Finish(*std::move(flight.frame)) : flight.frame.status();
-  if (frame.ok()) frame->timings.insert(frame->timings.begin(), {"queue", flight.queued_ms});
+void RenderThread::Answer(Flight& flight, absl::StatusOr<FrameResult> frame) {
   {
     const std::lock_guard lock(mutex_);
     --unfinished_;
@@ -132,26 +184,63 @@ void RenderThread::Finish(FrameRenderer& renderer, Flight flight) {
   flight.job.done(std::move(frame));
 }
 
+// The oldest.
+void RenderThread::Finish(FrameRenderer& renderer, Flights& flights) {
+  Flight flight = std::move(flights.frames.front());
+  flights.frames.pop_front();
+  if (!flight.frame.ok()) {
+    Answer(flight, flight.frame.status());
+  } else if (flight.job.stop.stop_requested() && !FrameRenderer::IsDrawn(**flight.frame, {})) {
+    Answer(flight, absl::CancelledError("frame cancelled"));
+    flights.cancelled.push_back(std::move(flight));
+  } else {
+    absl::StatusOr<FrameResult> frame = renderer.Finish(*std::move(flight.frame));
+    flight.watched.reset();
+    if (frame.ok()) frame->timings.insert(frame->timings.begin(), {"queue", flight.queued_ms});
+    Answer(flight, std::move(frame));
+  }
+}
+
 // Begins what waits, as long as another may be in flight, and finishes the oldest as soon as the
 // device has come to its end.
-void RenderThread::Serve(FrameRenderer& renderer) {
-  constexpr std::chrono::milliseconds kPatience(1);  // how soon a job is noticed meanwhile
-  std::deque<Flight> flights;                        // the oldest first
+absl::Status RenderThread::Serve(FrameRenderer& renderer) {
+  Flights flights;
   for (;;) {
-    bool begun = false;
-    if (flights.size() < renderer.frames_in_flight()) {
-      std::optional<Job> job = NextJob(renderer, flights.empty());
-      begun = job.has_value();
-      if (job) flights.push_back(Begin(renderer, *std::move(job)));
-      if (flights.empty()) return;
+    if (absl::Status reset = renderer.CheckReset(); !reset.ok()) {
+      for (Flight& flight : flights.frames) Answer(flight, reset);
+      return reset;
     }
-    const Flight& oldest = flights.front();
+    std::erase_if(flights.cancelled,
+                  [](const Flight& flight) { return FrameRenderer::IsDrawn(**flight.frame, {}); });
+    bool begun = false;
+    if (flights.frames.size() < renderer.frames_in_flight()) {
+      std::optional<Job> job = NextJob(renderer, flights);
+      begun = job.has_value();
+      if (job) flights.frames.push_back(Begin(renderer, *std::move(job)));
+      if (flights.frames.empty()) {
+        const std::lock_guard lock(mutex_);
+        if (stopping_ && jobs_.empty()) return absl::OkStatus();
+        continue;
+      }
+    }
+    const Flight& oldest = flights.frames.front();
     const auto wait = begun ? std::chrono::milliseconds(0) : kPatience;
     if (oldest.frame.ok() && !renderer.CanFinish(**oldest.frame, wait)) continue;
-    Flight flight = std::move(flights.front());
-    flights.pop_front();
-    Finish(renderer, std::move(flight));
-    if (flights.empty()) WarmUp(renderer);
+    Finish(renderer, flights);
+    if (flights.frames.empty()) WarmUp(renderer);
+  }
+}
+
+void RenderThread::End(const absl::Status& why) {
+  std::deque<Job> jobs;
+  {
+    const std::lock_guard lock(mutex_);
+    end_ = why;
+    jobs.swap(jobs_);
+  }
+  for (Job& job : jobs) {
+    Flight flight{std::move(job), false, 0.0, nullptr, why};
+    Answer(flight, why);
   }
 }
 
@@ -168,21 +257,39 @@ void RenderThread::WarmUp(FrameRenderer& renderer) {
   }
 }
 
-void RenderThread::Run(std::promise<absl::StatusOr<DeviceInfo>> started) {
+void RenderThread::Run(std::promise<absl::Status> started) {
   absl::StatusOr<std::unique_ptr<FrameRenderer>> renderer =
       FrameRenderer::Create(options_.device, options_.renderer);
   if (!renderer.ok()) {
     started.set_value(renderer.status());
     return;
   }
-  started.set_value((*renderer)->device());
+  device_ = (*renderer)->device();
+  frames_in_flight_ = static_cast<int>((*renderer)->frames_in_flight());
+  started.set_value(absl::OkStatus());
 
   if (options_.warm_up) {
     const std::vector<FrameRequest> frames = WarmUpFrames();
     warm_up_.assign(frames.begin(), frames.end());
     WarmUp(**renderer);
   }
-  Serve(**renderer);
+  while (!Serve(**renderer).ok()) {
+    {
+      const std::lock_guard lock(mutex_);
+      ++resets_;
+      starting_anew_since_ = Clock::now();
+    }
+    renderer->reset();
+    renderer = StartDeviceAnew(options_, device_, [this](std::chrono::milliseconds wait) {
+      std::unique_lock lock(mutex_);
+      return !changed_.wait_for(lock, wait, [this] { return stopping_; });
+    });
+    {
+      const std::lock_guard lock(mutex_);
+      starting_anew_since_.reset();
+    }
+    if (!renderer.ok()) return End(renderer.status());
+  }
 }
 
 }  // namespace

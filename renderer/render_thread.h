@@ -21,9 +21,10 @@ struct RenderThreadOptions {
   bool warm_up = false;
 };
 
-// Creates the context before it returns. InvalidArgument for a device that cannot be parsed,
-// NotFound for a named one that cannot be had, Unavailable where there is none at all. The engine's
-// destructor finishes what was accepted, then stops the thread.
+// Creates the context before it returns, and another when the device was reset: frames that were in
+// flight end with that error, those that wait go on. InvalidArgument for a device that cannot be
+// parsed, NotFound for a named one that cannot be had, Unavailable where there is none at all. The
+// engine's destructor finishes what was accepted, then stops the thread.
 absl::StatusOr<std::unique_ptr<FrameEngine>> StartRenderThread(const RenderThreadOptions& options);
 
 }  // namespace halflight

@@ -24,11 +24,15 @@ double Milliseconds(Clock::duration duration) {
   return std::chrono::duration<double, std::milli>(duration).count();
 }
 
-// What the engine has no memory for now, it may have when other frames have gone.
 absl::Status FromEngine(const absl::Status& status) {
-  return absl::IsResourceExhausted(status)
-             ? WithRetryHint(WithReason(status, v1::ERROR_REASON_DEVICE_MEMORY_FULL))
-             : status;
+  if (absl::IsResourceExhausted(status)) {
+    // There may be memory when other frames have gone.
+    return WithRetryHint(WithReason(status, v1::ERROR_REASON_DEVICE_MEMORY_FULL));
+  }
+  if (absl::IsUnavailable(status)) {
+    return WithRetryHint(WithReason(status, v1::ERROR_REASON_DEVICE_RESET));
+  }
+  return status;
 }
 
 absl::Status TooLongError(std::chrono::milliseconds allowed) {
@@ -89,7 +93,7 @@ FramePipeline::FramePipeline(FrameEngine& engine, PipelineOptions options)
       options_(std::move(options)),
       frame_memory_(std::make_shared<ByteBudget>(options_.max_frame_bytes)),
       workers_(options_.encode_threads),
-      queue_(engine, options_.frames_in_engine) {
+      queue_(engine, engine.frames_in_flight()) {
   if (options_.warm_up) {
     workers_.Post([this] { WarmUp(); });
   }
@@ -213,6 +217,7 @@ void FramePipeline::Render(const FlightPtr& flight, FrameRequest request, Stage 
   queue_.Push({.client = flight->job.caller.client(),
                .priority = flight->job.priority,
                .goes_on = flight->rendering_begun,
+               .fingerprint = flight->job.fingerprint,
                .request = std::move(request),
                .stop = flight->stop.get_token(),
                .begun = [this, flight] { OnBegun(flight); },

@@ -48,7 +48,6 @@ struct PipelineOptions {
   uint64_t max_frame_bytes = std::numeric_limits<uint64_t>::max();
   // From when a frame's rendering begins until it is encoded.
   std::chrono::milliseconds max_frame_time = std::chrono::milliseconds::max();
-  int frames_in_engine = 1;  // as FrameQueue's at_once
   int encode_threads = 1;
   // Whether to encode a small image of each kind of file at once, so that the first frame does not
   // wait for what the image library does the first time.
@@ -82,9 +81,10 @@ class FramePipeline {
   // knowledge lets it. When it returns OK, `done` is called
   // exactly once, on a thread of the pipeline, never of the engine: with the frame, with an error,
   // or with Cancelled soon after `stop` was requested; DeadlineExceeded where the frame took too
-  // long. Frames may be done in another order than they were submitted. Otherwise `done` is never
-  // called: ResourceExhausted with reason and retry hint when too many frames are under way, or of
-  // this client, or when they hold too much memory. Any thread.
+  // long, Unavailable where the device failed under it, FailedPrecondition where it did so before.
+  // Frames may be done in another order than they were submitted. Otherwise `done` is never called:
+  // ResourceExhausted with reason and retry hint when too many frames are under way, or of this
+  // client, or when they hold too much memory. Any thread.
   absl::Status Submit(FrameJob job, std::stop_token stop, Done done);
 
   // Frames accepted and not yet encoded. Any thread.

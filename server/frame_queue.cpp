@@ -4,8 +4,21 @@
 #include <utility>
 #include <vector>
 
+#include <fmt/format.h>
+
+#include "renderer/device_fault.h"
+#include "server/error_detail.h"
+
 namespace halflight {
 namespace {
+
+absl::Status FaultedError(int times) {
+  return WithReason(
+      absl::FailedPreconditionError(fmt::format(
+          "the device has failed under this request {} times: this server does not draw it again",
+          times)),
+      v1::ERROR_REASON_FAULTED_TWICE);
+}
 
 // To what the engine has counted from when it was given the frame.
 void AddWait(std::chrono::duration<double, std::milli> wait, std::vector<StageTiming>& timings) {
@@ -127,22 +140,33 @@ void FrameQueue::Give(const EntryPtr& entry) {
     frame.begun();
   }
   const auto begin = now_();
-  const absl::Status status =
-      engine_.Submit(std::move(frame.request), frame.stop,
-                     [this, entry, begin](absl::StatusOr<FrameResult> result) {
-                       // The next one first: the engine shall not wait for what becomes of this
-                       // one.
-                       OnRendered(entry->frame.client, begin);
-                       Advance();
-                       if (result.ok()) {
-                         AddWait(begin - entry->pushed, result->timings);
-                       }
-                       End(*entry, std::move(result));
-                     });
-  if (!status.ok()) {
+  if (const absl::Status status = Submit(entry, begin); !status.ok()) {
     OnRendered(frame.client, begin);
     End(*entry, status);
   }
+}
+
+absl::Status FrameQueue::Submit(const EntryPtr& entry, Clock::time_point begin) {
+  QueuedFrame& frame = entry->frame;
+  const int faults = faulted_.Count(frame.fingerprint);
+  if (faults >= FaultedRequests::kTooMany) {
+    return FaultedError(faults);
+  }
+  frame.request.alone = faults > 0;  // so that no other is taken for the cause
+  return engine_.Submit(std::move(frame.request), frame.stop,
+                        [this, entry, begin](absl::StatusOr<FrameResult> result) {
+                          if (IsSuspect(result.status())) {
+                            faulted_.Blame(entry->frame.fingerprint);
+                          }
+                          // The next one first: the engine shall not wait for what becomes of this
+                          // one.
+                          OnRendered(entry->frame.client, begin);
+                          Advance();
+                          if (result.ok()) {
+                            AddWait(begin - entry->pushed, result->timings);
+                          }
+                          End(*entry, std::move(result));
+                        });
 }
 
 void FrameQueue::End(const Entry& entry, absl::StatusOr<FrameResult> result) {

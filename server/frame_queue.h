@@ -14,6 +14,7 @@
 #include <string>
 
 #include "renderer/frame_engine.h"
+#include "server/faulted_requests.h"
 
 namespace halflight {
 
@@ -23,6 +24,7 @@ struct QueuedFrame {
   std::string client{};
   int priority = 0;      // among the frames of its client: higher goes first
   bool goes_on = false;  // of a frame that was rendered before: before all others of its client
+  std::string fingerprint{};  // of all that it is made from
   FrameRequest request{};
   std::stop_token stop{};
   std::function<void()> begun{};  // when its turn has come; may be empty
@@ -34,6 +36,7 @@ struct QueuedFrame {
 // of n clients that always wait, each gets an n-th of the renderer, however many frames it sends
 // and however long they are. A client that comes back after a pause has no claim to what it did not
 // use.
+// A frame under which the device was reset twice is refused from then on.
 class FrameQueue {
  public:
   using Clock = std::chrono::steady_clock;
@@ -50,8 +53,9 @@ class FrameQueue {
   FrameQueue& operator=(FrameQueue&&) = delete;
 
   // `begun` and `done` are called at most once and exactly once, without locks, and must only hand
-  // over. `done` gets what the engine says; of a frame that waits, Cancelled at once when `stop` is
-  // requested. Any thread.
+  // over. `done` gets what the engine says; FailedPrecondition for a frame that the device has
+  // failed under twice; of a frame that waits, Cancelled at once when `stop` is requested. Any
+  // thread.
   void Push(QueuedFrame frame);
 
   // Frames that wait. Any thread.
@@ -80,11 +84,13 @@ class FrameQueue {
   // Under the mutex: takes the next frame; null where there is none.
   EntryPtr TakeNext();
   void Give(const EntryPtr& entry);
+  absl::Status Submit(const EntryPtr& entry, Clock::time_point begin);
   void End(const Entry& entry, absl::StatusOr<FrameResult> result);
   void OnRendered(const std::string& client, Clock::time_point begin);
   void ForgetIdleClients();
 
   FrameEngine& engine_;
+  FaultedRequests faulted_;
   const int at_once_;
   const std::function<Clock::time_point()> now_;
 

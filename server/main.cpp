@@ -10,7 +10,6 @@
 #include <utility>
 #include <vector>
 
-#include "renderer/block_cache.h"
 #include "renderer/kept_memory.h"
 #include "renderer/render_thread.h"
 #include "server/access/access.h"
@@ -25,6 +24,7 @@
 #include "server/particle_files.h"
 #include "server/service_manager.h"
 #include "server/status_text.h"
+#include "server/supervision.h"
 #include "server/version.h"
 
 namespace {
@@ -35,12 +35,10 @@ using namespace halflight;  // NOLINT(google-build-using-namespace): the whole p
 constexpr int kExitCannotStart = 1;
 constexpr int kExitBadFlags = 2;
 constexpr int kExitCutShort = 3;
+constexpr int kExitDeviceLost = 4;
 
-// How often a drain looks whether it is over.
-constexpr timespec kDrainPoll{.tv_sec = 0, .tv_nsec = 20'000'000};
-// How long no call may come before memory goes back: longer than the pauses of somebody at work,
-// who would wait for it to be taken again.
-constexpr timespec kIdlePoll{.tv_sec = 10, .tv_nsec = 0};
+// How long what does not need a device that was lost may go on, such as telling clients of it.
+constexpr std::chrono::seconds kAfterDeviceLost{2};
 
 sigset_t BlockTerminationSignals() {
   sigset_t signals;
@@ -49,41 +47,6 @@ sigset_t BlockTerminationSignals() {
   sigaddset(&signals, SIGINT);
   pthread_sigmask(SIG_BLOCK, &signals, nullptr);
   return signals;
-}
-
-// The signal that ends the service. Meanwhile gives memory back: of uploads that nobody resumes,
-// and whenever calls have stopped coming.
-int WaitForSignal(const GrpcServer& server, PartialUploads& partial_uploads,
-                  const sigset_t& signals) {
-  uint64_t seen = 0;
-  std::optional<uint64_t> given_back;
-  while (true) {
-    if (const int signal = sigtimedwait(&signals, nullptr, &kIdlePoll); signal > 0) {
-      return signal;
-    }
-    partial_uploads.DropExpired();
-    const uint64_t begun = server.calls_begun();
-    if (server.idle() && begun == seen && begun != given_back) {
-      BlockCache::Release();
-      GiveBackFreedMemory();
-      given_back = begun;
-    }
-    seen = begun;
-  }
-}
-
-// True when nothing is under way any more, and nothing waits to be written to disk; false when a
-// second signal or the time came first.
-bool Drain(GrpcServer& server, const ParticleStore& store, const sigset_t& signals, int seconds) {
-  const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(seconds);
-  server.BeginDrain();
-  while (!server.idle() || !store.idle()) {
-    if (sigtimedwait(&signals, nullptr, &kDrainPoll) > 0 ||
-        std::chrono::steady_clock::now() >= until) {
-      return false;
-    }
-  }
-  return true;
 }
 
 int Fail(int code, const absl::Status& status) {
@@ -135,14 +98,19 @@ int Run(const Options& options, std::vector<ListeningSocket> inherited, const si
       StartRenderThread({.device = options.device,
                          .max_queued_frames = static_cast<int>(options.limits.max_queued_frames),
                          .renderer = {.max_reuse_bytes = options.max_reuse_bytes,
-                                      .frames_in_flight = options.frames_in_flight},
-                         .warm_up = true});
+                                      .frames_in_flight = options.frames_in_flight,
+                                      .faults = options.faults},
+                         // Planned faults are those of clients' frames.
+                         .warm_up = options.faults == nullptr});
   if (!engine.ok()) {
     return Fail(kExitCannotStart, engine.status());
   }
   const DeviceInfo& device = (*engine)->device();
   Log(LogLevel::kInfo, "device",
-      {{"renderer", device.gl_renderer}, {"gl", device.gl_version}, {"software", device.software}});
+      {{"renderer", device.gl_renderer},
+       {"gl", device.gl_version},
+       {"software", device.software},
+       {"tells_of_resets", device.tells_of_resets}});
 
   // Each uses those above it, and is gone before them.
   ServerLimits limits = LimitsOnDevice(options.limits, device);
@@ -184,10 +152,17 @@ int Run(const Options& options, std::vector<ListeningSocket> inherited, const si
   }
   NotifyServiceManager("READY=1");
 
-  const int signal = WaitForSignal(**server, partial_uploads, signals);
-  Log(LogLevel::kInfo, "draining", {{"signal", signal}, {"drain_seconds", options.drain_seconds}});
+  Supervision supervision(**server, **engine, partial_uploads, store, signals,
+                          std::chrono::seconds(options.watchdog_seconds));
+  const std::optional<int> signal = supervision.WaitForEnd();
   NotifyServiceManager("STOPPING=1");
-  if (!Drain(**server, store, signals, options.drain_seconds)) {
+  if (!signal.has_value()) {
+    // What waits for the device waits for ever, and so would everything's destructors.
+    supervision.Drain(kAfterDeviceLost);
+    std::_Exit(kExitDeviceLost);
+  }
+  Log(LogLevel::kInfo, "draining", {{"signal", *signal}, {"drain_seconds", options.drain_seconds}});
+  if (!supervision.Drain(std::chrono::seconds(options.drain_seconds))) {
     // At once: what runs may be stuck, so nothing is waited for.
     Log(LogLevel::kError, "cut_short",
         {{"message", "stopped before the calls under way were finished"}});

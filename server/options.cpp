@@ -14,6 +14,7 @@
 #include "absl/strings/numbers.h"
 #include "renderer/scene.h"
 #include "server/convert/field_checks.h"
+#include "server/status_text.h"
 #include "server/version.h"
 
 namespace halflight {
@@ -41,6 +42,21 @@ void AddFlags(CLI::App& app, Options& options) {
   app.add_option("--drain-seconds", options.drain_seconds,
                  "How long what runs may go on after SIGTERM")
       ->capture_default_str();
+  app.add_option("--watchdog-seconds", options.watchdog_seconds,
+                 "How long the device may not come back from a frame that was cancelled or took "
+                 "too long before halflightd ends with exit code 4; 0: for ever")
+      ->capture_default_str();
+  // For tests, so not listed: drawings that shall find the device failing.
+  app.add_option_function<std::string>(
+         "--plan-device-faults",
+         [&options](const std::string& text) {
+           auto faults = PlannedFaults::Parse(text);
+           if (!faults.ok()) {
+             throw CLI::ValidationError("--plan-device-faults", MessageOf(faults.status()));
+           }
+           options.faults = std::make_shared<PlannedFaults>(*std::move(faults));
+         })
+      ->group("");
 }
 
 void AddObservabilityFlags(CLI::App& app, Options& options) {
@@ -214,6 +230,7 @@ absl::Status Check(const Options& options) {
   }
   checks.InRange("--encode-threads", options.encode_threads, {.low = 0.0, .high = 256.0});
   checks.InRange("--drain-seconds", options.drain_seconds, {.low = 0.0, .high = 86400.0});
+  checks.InRange("--watchdog-seconds", options.watchdog_seconds, {.low = 0.0, .high = 86400.0});
 
   const ServerLimits& limits = options.limits;
   checks.InRange("--frames-in-flight", options.frames_in_flight, {.low = 0.0, .high = 16.0});

@@ -2,11 +2,13 @@
 #pragma once
 
 #include <iosfwd>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "absl/status/statusor.h"
+#include "renderer/device_fault.h"
 #include "server/access/access.h"
 #include "server/limits.h"
 #include "server/log/log.h"
@@ -29,9 +31,11 @@ struct Options {
   bool channelz = false;   // as in GrpcServerOptions
   int encode_threads = 0;  // filled in: one for each core, less the one that renders
   int drain_seconds = 30;
-  std::string cache_dir;                // empty: particle sets are kept in memory only
-  uint64_t max_reuse_bytes = 1 * kGiB;  // as in FrameRendererOptions
-  int frames_in_flight = 0;             // as in FrameRendererOptions
+  int watchdog_seconds = 60;              // 0: a device that hangs is not noticed
+  std::shared_ptr<PlannedFaults> faults;  // null: none
+  std::string cache_dir;                  // empty: particle sets are kept in memory only
+  uint64_t max_reuse_bytes = 1 * kGiB;    // as in FrameRendererOptions
+  int frames_in_flight = 0;               // as in FrameRendererOptions
 };
 
 // What a flag does not say is taken from the file that --config names: a line "<flag> = <value>"

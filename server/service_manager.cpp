@@ -1,6 +1,7 @@
 #include "server/service_manager.h"
 
 #include <cstddef>
+#include <cstdint>
 #include <cstdlib>
 #include <cstring>
 #include <string>
@@ -52,6 +53,16 @@ absl::StatusOr<std::vector<ListeningSocket>> TakeInheritedSockets() {
     sockets.push_back(*std::move(socket));
   }
   return sockets;
+}
+
+std::optional<std::chrono::microseconds> WatchdogInterval() {
+  const std::string pid = Variable("WATCHDOG_PID");
+  int64_t microseconds = 0;
+  if ((!pid.empty() && pid != std::to_string(getpid())) ||
+      !absl::SimpleAtoi(Variable("WATCHDOG_USEC"), &microseconds) || microseconds <= 0) {
+    return std::nullopt;
+  }
+  return std::chrono::microseconds(microseconds);
 }
 
 void NotifyServiceManager(const char* state) {

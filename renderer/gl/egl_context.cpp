@@ -7,6 +7,7 @@
 #include <cctype>
 #include <cstdlib>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "absl/strings/ascii.h"
@@ -172,16 +173,14 @@ struct EglContext::Handles {
     EGLConfig config = nullptr;
     EGLint configs = 0;
     eglChooseConfig(display, kConfig.data(), &config, 1, &configs);
-    constexpr std::array<EGLint, 7> kContext = {EGL_CONTEXT_MAJOR_VERSION,
-                                                4,
-                                                EGL_CONTEXT_MINOR_VERSION,
-                                                5,
-                                                EGL_CONTEXT_OPENGL_PROFILE_MASK,
-                                                EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT,
-                                                EGL_NONE};
-    context =
-        eglCreateContext(display, configs > 0 ? config : nullptr, EGL_NO_CONTEXT, kContext.data());
-    if (context == EGL_NO_CONTEXT) return EglError(candidate, "eglCreateContext");
+    if (!configs) config = nullptr;
+    // One that tells of resets, where the driver has it.
+    if (!MakeContext(config,
+                     {EGL_CONTEXT_OPENGL_ROBUST_ACCESS, EGL_TRUE,
+                      EGL_CONTEXT_OPENGL_RESET_NOTIFICATION_STRATEGY, EGL_LOSE_CONTEXT_ON_RESET}) &&
+        !MakeContext(config, {})) {
+      return EglError(candidate, "eglCreateContext");
+    }
     if (eglMakeCurrent(display, EGL_NO_SURFACE, EGL_NO_SURFACE, context) != EGL_TRUE) {
       return EglError(candidate, "eglMakeCurrent");
     }
@@ -190,6 +189,14 @@ struct EglContext::Handles {
           absl::StrCat(candidate.description, ": no GL_ARB_gl_spirv (", DescribeGl(), ")"));
     }
     return absl::OkStatus();
+  }
+
+  bool MakeContext(EGLConfig config, std::vector<EGLint> attributes) {
+    attributes.insert(attributes.end(), {EGL_CONTEXT_MAJOR_VERSION, 4, EGL_CONTEXT_MINOR_VERSION, 5,
+                                         EGL_CONTEXT_OPENGL_PROFILE_MASK,
+                                         EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT, EGL_NONE});
+    context = eglCreateContext(display, config, EGL_NO_CONTEXT, attributes.data());
+    return context != EGL_NO_CONTEXT;
   }
 
   static std::string DescribeGl() {
@@ -232,6 +239,9 @@ absl::StatusOr<std::unique_ptr<EglContext>> EglContext::Create(const std::string
     info.software = info.gl_renderer.find("llvmpipe") != std::string::npos ||
                     info.gl_renderer.find("softpipe") != std::string::npos;
     glGetIntegerv(GL_MAX_TEXTURE_SIZE, &info.max_texture_size);
+    GLint strategy = GL_NO_RESET_NOTIFICATION;
+    glGetIntegerv(GL_RESET_NOTIFICATION_STRATEGY, &strategy);
+    info.tells_of_resets = strategy == GL_LOSE_CONTEXT_ON_RESET;
     return std::unique_ptr<EglContext>(new EglContext(std::move(handles), std::move(info)));
   }
   const bool named = choice->kind != DeviceChoice::Kind::kAuto;

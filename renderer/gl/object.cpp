@@ -1,32 +1,59 @@
 #include "renderer/gl/object.h"
 
 #include <array>
+#include <atomic>
+#include <unordered_map>
 
 namespace halflight::gl {
 
 namespace {
 
-Buffer MakeImmutableBuffer(const char* label, size_t bytes, const void* contents) {
+std::atomic<uint64_t> held_objects = 0;
+std::atomic<uint64_t> held_bytes = 0;
+
+// Bytes by name: names are of the context, and contexts of one thread.
+using Sizes = std::unordered_map<GLuint, size_t>;
+thread_local Sizes buffer_sizes;
+thread_local Sizes texture_sizes;
+
+void Count(Sizes& sizes, GLuint name, size_t bytes) {
+  if (name == 0) return;  // of a context that was lost
+  sizes[name] = bytes;
+  ++held_objects;
+  held_bytes += bytes;
+}
+
+void Uncount(Sizes& sizes, GLuint name) {
+  const auto size = sizes.extract(name);
+  if (size.empty()) return;
+  --held_objects;
+  held_bytes -= size.mapped();
+}
+
+Buffer MakeImmutableBuffer(const char* label, size_t bytes, const void* contents,
+                           GLbitfield flags) {
   GLuint name = 0;
   glCreateBuffers(1, &name);
   // A buffer of no bytes cannot be made; an absent attribute still needs something to bind.
   const size_t size = bytes == 0 ? sizeof(float) : bytes;
-  glNamedBufferStorage(name, static_cast<GLsizeiptr>(size), bytes == 0 ? nullptr : contents, 0);
+  glNamedBufferStorage(name, static_cast<GLsizeiptr>(size), bytes == 0 ? nullptr : contents, flags);
   glObjectLabel(GL_BUFFER, name, -1, label);
+  Count(buffer_sizes, name, size);
   return Buffer(name);
 }
 
-}  // namespace
-
-Buffer MakeBuffer(const char* label, std::span<const std::byte> contents) {
-  return MakeImmutableBuffer(label, contents.size(), contents.data());
+// As the device keeps it.
+size_t BytesOf(GLuint texture, const TextureInfo& info) {
+  size_t bits = 0;
+  for (const GLenum part : {GL_TEXTURE_RED_SIZE, GL_TEXTURE_GREEN_SIZE, GL_TEXTURE_BLUE_SIZE,
+                            GL_TEXTURE_ALPHA_SIZE, GL_TEXTURE_DEPTH_SIZE}) {
+    GLint size = 0;
+    glGetTextureLevelParameteriv(texture, 0, part, &size);
+    bits += static_cast<size_t>(size);
+  }
+  return static_cast<size_t>(info.width) * static_cast<size_t>(info.height) *
+         static_cast<size_t>(info.layers > 0 ? info.layers : 1) * bits / 8;
 }
-
-Buffer MakeBuffer(const char* label, size_t bytes) {
-  return MakeImmutableBuffer(label, bytes, nullptr);
-}
-
-namespace {
 
 GLuint CreateTexture(const TextureInfo& info) {
   GLuint name = 0;
@@ -41,10 +68,31 @@ GLuint CreateTexture(const TextureInfo& info) {
   glTextureParameteri(name, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
   glTextureParameteri(name, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
   glObjectLabel(GL_TEXTURE, name, -1, info.label);
+  Count(texture_sizes, name, BytesOf(name, info));
   return name;
 }
 
 }  // namespace
+
+void BufferTraits::Delete(GLuint name) {
+  Uncount(buffer_sizes, name);
+  glDeleteBuffers(1, &name);
+}
+
+void TextureTraits::Delete(GLuint name) {
+  Uncount(texture_sizes, name);
+  glDeleteTextures(1, &name);
+}
+
+Held HeldMemory() { return {held_objects, held_bytes}; }
+
+Buffer MakeBuffer(const char* label, std::span<const std::byte> contents) {
+  return MakeImmutableBuffer(label, contents.size(), contents.data(), 0);
+}
+
+Buffer MakeBuffer(const char* label, size_t bytes, GLbitfield flags) {
+  return MakeImmutableBuffer(label, bytes, nullptr, flags);
+}
 
 Texture::Texture(const TextureInfo& info)
     : Object(CreateTexture(info)), width_(info.width), height_(info.height) {}

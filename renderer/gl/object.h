@@ -5,6 +5,7 @@
 #include <epoxy/gl.h>
 
 #include <cstddef>
+#include <cstdint>
 #include <initializer_list>
 #include <span>
 #include <string>
@@ -38,10 +39,10 @@ class Object {
 };
 
 struct BufferTraits {
-  static void Delete(GLuint name) { glDeleteBuffers(1, &name); }
+  static void Delete(GLuint name);
 };
 struct TextureTraits {
-  static void Delete(GLuint name) { glDeleteTextures(1, &name); }
+  static void Delete(GLuint name);
 };
 struct FramebufferTraits {
   static void Delete(GLuint name) { glDeleteFramebuffers(1, &name); }
@@ -66,10 +67,17 @@ using Program = Object<ProgramTraits>;
 using Shader = Object<ShaderTraits>;
 using Query = Object<QueryTraits>;
 
+// What all buffers and textures of the process are at the moment. Any thread.
+struct Held {
+  uint64_t objects = 0;
+  uint64_t bytes = 0;
+};
+Held HeldMemory();
+
 // A buffer of fixed size and contents.
 Buffer MakeBuffer(const char* label, std::span<const std::byte> contents);
-// The same without contents: only the GPU writes it.
-Buffer MakeBuffer(const char* label, size_t bytes);
+// The same without contents: only the GPU writes it. `flags` as glNamedBufferStorage.
+Buffer MakeBuffer(const char* label, size_t bytes, GLbitfield flags = 0);
 
 template <typename T, typename Allocator>
 Buffer MakeBuffer(const char* label, const std::vector<T, Allocator>& values) {

@@ -10,13 +10,10 @@ namespace {
 constexpr GLbitfield kMapping = GL_MAP_READ_BIT | GL_MAP_PERSISTENT_BIT | GL_MAP_COHERENT_BIT;
 
 StagingMemory::Block MakeBlock(size_t bytes) {
-  GLuint name = 0;
-  glCreateBuffers(1, &name);
-  StagingMemory::Block block{Buffer(name), nullptr, bytes};
-  const auto size = static_cast<GLsizeiptr>(bytes);
-  glNamedBufferStorage(name, size, nullptr, kMapping | GL_CLIENT_STORAGE_BIT);
-  glObjectLabel(GL_BUFFER, name, -1, "readback");
-  block.contents = static_cast<const std::byte*>(glMapNamedBufferRange(name, 0, size, kMapping));
+  StagingMemory::Block block{MakeBuffer("readback", bytes, kMapping | GL_CLIENT_STORAGE_BIT),
+                             nullptr, bytes};
+  block.contents = static_cast<const std::byte*>(
+      glMapNamedBufferRange(block.buffer.name(), 0, static_cast<GLsizeiptr>(bytes), kMapping));
   return block;
 }
 

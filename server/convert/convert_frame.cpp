@@ -32,6 +32,15 @@ void CheckRequestId(const std::string& id, FieldChecks& checks) {
   }
 }
 
+// What makes no difference to the frame is left out.
+std::string FingerprintOf(const v1::RenderFrameRequest& request, const NamedParticles& particles) {
+  v1::RenderFrameRequest made_from = request;
+  made_from.clear_request_id();
+  made_from.clear_priority();
+  made_from.mutable_scene()->set_particle_sha256(particles.sha256);
+  return Sha256Of(made_from.SerializeAsString());
+}
+
 }  // namespace
 
 absl::StatusOr<NamedParticles> ResolveParticles(const v1::Scene& scene, ParticleStore& store,
@@ -103,6 +112,7 @@ absl::StatusOr<FrameJob> ConvertFrame(const v1::RenderFrameRequest& request,
   if (!checks.ok()) {
     return checks.status();
   }
+  job.fingerprint = FingerprintOf(request, particles);
   return job;
 }
 

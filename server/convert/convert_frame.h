@@ -26,6 +26,7 @@ struct FrameJob {
   Caller caller;     // not of the request: filled in by who submits it
   int priority = 0;  // among the frames of that client
   std::string particle_sha256;
+  std::string fingerprint;  // SHA-256 of all that the frame is made from
   FrameRequest request;
   std::vector<OutputJob> outputs;
   std::optional<MeasureJob> measure;

@@ -74,11 +74,12 @@ void AddDevice(Families& to, const EngineState& state) {
   AddGauge(to, "halflight_gl_objects", "Buffers and textures", state.gl_objects);
   AddCounter(to, "halflight_device_resets_total", "How often the device was started anew",
              state.device_resets);
-  const std::chrono::duration<double> busy =
-      state.busy_since.has_value() ? std::chrono::steady_clock::now() - *state.busy_since
-                                   : std::chrono::steady_clock::duration{};
-  AddGauge(to, "halflight_device_busy_seconds",
-           "How long the device has been at the same step of a frame", busy.count());
+  const std::chrono::duration<double> overdue =
+      state.overdue_since.has_value() ? std::chrono::steady_clock::now() - *state.overdue_since
+                                      : std::chrono::steady_clock::duration{};
+  AddGauge(to, "halflight_device_overdue_seconds",
+           "Since when the device should have come back from a frame that was told to stop",
+           overdue.count());
 }
 
 void AddLimits(Families& to, const ServerLimits& limits) {

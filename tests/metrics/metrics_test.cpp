@@ -96,18 +96,19 @@ TEST(PrometheusMetrics, WhatHasNotHappenedYetIsZeroNotMissing) {
   }
 }
 
-class BusyEngine : public testing::FakeEngine {
+class OverdueEngine : public testing::FakeEngine {
  public:
   [[nodiscard]] EngineState state() const override {
     return {.gl_objects = 7,
             .gl_bytes = uint64_t{5} << 32U,
             .device_resets = 3,
-            .busy_since = std::chrono::steady_clock::now() - std::chrono::minutes(2)};
+            .end = {},
+            .overdue_since = std::chrono::steady_clock::now() - std::chrono::minutes(2)};
   }
 };
 
 TEST(ServerState, IsReadWhenSomebodyLooks) {
-  BusyEngine engine;
+  OverdueEngine engine;
   const ServerLimits limits{.max_queued_frames = 11};
   const std::string version = "1.2.3";
   ParticleStore store(8 << 20);
@@ -129,7 +130,7 @@ TEST(ServerState, IsReadWhenSomebodyLooks) {
   EXPECT_EQ(page["halflight_gl_objects"], 7.0);
   EXPECT_EQ(page["halflight_gl_memory_bytes"], 5.0 * 0x1p32);
   EXPECT_EQ(page["halflight_device_resets_total"], 3.0);
-  EXPECT_GE(page["halflight_device_busy_seconds"], 120.0);
+  EXPECT_GE(page["halflight_device_overdue_seconds"], 120.0);
   EXPECT_EQ(page[R"(halflight_limit{name="max_queued_frames"})"], 11.0);
   EXPECT_EQ(
       page[R"(halflight_build_info{version="1.2.3",gl_renderer="fake",gl_version="4.5 fake"})"],
@@ -141,7 +142,6 @@ TEST(ServerState, IsReadWhenSomebodyLooks) {
   EXPECT_GT(page["process_open_fds"], 3.0);
   EXPECT_GT(page["process_start_time_seconds"], 1.6e9);
 
-  (*server)->SetServing(false);
   ParticleSet set;
   set.positions.resize(2);
   store.Insert("a", std::make_shared<const ParticleSet>(std::move(set)));
@@ -152,7 +152,6 @@ TEST(ServerState, IsReadWhenSomebodyLooks) {
   const auto reader = stub->RenderFrame(&context, testing::MakeRequest());
   ASSERT_TRUE(testing::WaitFor([&] { return engine.waiting() == 1; }));
   page = MetricsPage::Fetch(address);
-  EXPECT_EQ(page["halflight_serving"], 0.0);
   EXPECT_EQ(page["halflight_cache_sets"], 1.0);
   EXPECT_EQ(page["halflight_cache_bytes"], 24.0);
   EXPECT_EQ(page["halflight_frames_in_progress"], 1.0);
@@ -164,6 +163,8 @@ TEST(ServerState, IsReadWhenSomebodyLooks) {
   EXPECT_EQ(page["halflight_connections_accepted_total"], 1.0);
   context.TryCancel();
   EXPECT_FALSE(reader->Finish().ok());
+  (*server)->BeginDrain();
+  EXPECT_EQ(MetricsPage::Fetch(address)["halflight_serving"], 0.0);
 }
 
 }  // namespace

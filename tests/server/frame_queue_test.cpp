@@ -10,6 +10,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "renderer/device_fault.h"
+#include "server/error_detail.h"
+
 namespace halflight {
 namespace {
 
@@ -18,24 +21,26 @@ using ::testing::ElementsAre;
 
 class ManualEngine : public FrameEngine {
  public:
-  absl::Status Submit(FrameRequest /*request*/, std::stop_token /*stop*/, Done done) override {
+  absl::Status Submit(FrameRequest request, std::stop_token /*stop*/, Done done) override {
     if (!refusal.ok()) {
       return refusal;
     }
     jobs_.push_back(std::move(done));
+    alone.push_back(request.alone);
     return absl::OkStatus();
   }
   [[nodiscard]] const DeviceInfo& device() const override { return device_; }
 
   // Finishes the oldest frame.
-  void Render() {
+  void Render(absl::StatusOr<FrameResult> result = FrameResult{}) {
     const Done done = std::move(jobs_.front());
     jobs_.pop_front();
-    done(FrameResult{});
+    done(std::move(result));
   }
   [[nodiscard]] size_t given() const { return jobs_.size(); }
 
   absl::Status refusal;
+  std::vector<bool> alone;  // of what it was given
 
  private:
   const DeviceInfo device_{};
@@ -199,6 +204,54 @@ TEST_F(Queue, TimingsBeginWithTheWaitForTheTurn) {
   ASSERT_FALSE(results_.at(1)->timings.empty());
   EXPECT_EQ(results_.at(1)->timings.front().stage, "queue");
   EXPECT_DOUBLE_EQ(results_.at(1)->timings.front().milliseconds, 2000.0);
+}
+
+// Also of what waited already when the second happened.
+TEST_F(Queue, FrameThatTheDeviceFailedUnderTwiceIsRefused) {
+  for (int i = 0; i < 3; ++i) {
+    Push("a", "deadly", {.fingerprint = "deadly"});
+  }
+  Push("a", "harmless", {.fingerprint = "harmless"});
+  engine_.Render(DeviceResetError(false));
+  engine_.Render(DeviceResetError(false));
+  EXPECT_THAT(done_, ElementsAre("deadly", "deadly", "deadly"));
+  // The next one's turn comes before a frame is answered.
+  EXPECT_EQ(results_.at(2).status().code(), absl::StatusCode::kUnavailable);
+  const absl::Status refused = results_.at(1).status();
+  EXPECT_EQ(refused.code(), absl::StatusCode::kFailedPrecondition);
+  EXPECT_EQ(DetailOf(refused).reason, v1::ERROR_REASON_FAULTED_TWICE);
+  EXPECT_EQ(DetailOf(refused).retry_after, std::nullopt);
+  Render(1, seconds(1));
+  EXPECT_TRUE(results_.at(3).ok());
+  // The second was drawn alone, so that nobody else could be suspected.
+  EXPECT_THAT(engine_.alone, ElementsAre(false, true, false));
+}
+
+TEST_F(Queue, FrameThatIsNotSuspectIsDrawnAgain) {
+  for (const absl::Status& failure :
+       {DeviceResetError(true), absl::InternalError("a fault of GL"), DeviceResetError(true)}) {
+    Push("a", "unlucky", {.fingerprint = "unlucky"});
+    engine_.Render(failure);
+  }
+  Push("a", "unlucky", {.fingerprint = "unlucky"});
+  EXPECT_EQ(engine_.given(), 1U);
+  Render(1, seconds(1));
+  EXPECT_THAT(engine_.alone, ::testing::Each(false));
+}
+
+TEST(FaultedRequests, ForgetTheOldestBeyondTheirBound) {
+  FaultedRequests faulted;
+  faulted.Blame("old");
+  faulted.Blame("kept");
+  for (size_t i = 0; i + 2 < FaultedRequests::kMost; ++i) {
+    faulted.Blame(std::to_string(i));
+  }
+  faulted.Blame("kept");
+  EXPECT_EQ(faulted.Count("old"), 1);
+  faulted.Blame("new");
+  EXPECT_EQ(faulted.Count("old"), 0);
+  EXPECT_EQ(faulted.Count("kept"), 2);
+  EXPECT_EQ(faulted.Count("new"), 1);
 }
 
 }  // namespace

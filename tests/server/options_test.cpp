@@ -133,6 +133,8 @@ TEST(Options, ErrorsNameFlagValueAndWhatIsAllowed) {
               HasSubstr("--max-partial-uploads: 65537, allowed: [0, 65536]"));
   EXPECT_THAT(ErrorOf({"--partial-upload-seconds", "-1"}), HasSubstr("--partial-upload-seconds"));
   EXPECT_THAT(ErrorOf({"--drain-seconds", "-1"}), HasSubstr("--drain-seconds"));
+  EXPECT_THAT(ErrorOf({"--watchdog-seconds", "-1"}), HasSubstr("--watchdog-seconds"));
+  EXPECT_THAT(ErrorOf({"--plan-device-faults", "flood:1"}), HasSubstr("\"flood:1\", allowed: "));
   EXPECT_THAT(ErrorOf({"--frames-in-flight", "17"}),
               HasSubstr("--frames-in-flight: 17, allowed: [0, 16]"));
   EXPECT_THAT(ErrorOf({"--no-such-flag"}), HasSubstr("--no-such-flag"));

@@ -1,0 +1,95 @@
+#include "server/supervision.h"
+
+#include <fmt/format.h>
+
+#include "renderer/block_cache.h"
+#include "renderer/kept_memory.h"
+#include "server/log/log.h"
+#include "server/service_manager.h"
+#include "server/status_text.h"
+
+namespace halflight {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+// How often the device is looked at.
+constexpr timespec kLook{.tv_sec = 0, .tv_nsec = 250'000'000};
+// How long no call may come before memory goes back: longer than the pauses of somebody at work,
+// who would wait for it to be taken again.
+constexpr std::chrono::seconds kIdle(10);
+// How often a drain looks whether it is over.
+constexpr timespec kDrainPoll{.tv_sec = 0, .tv_nsec = 20'000'000};
+
+}  // namespace
+
+std::optional<std::string> DeviceTrouble(const EngineState& state, std::chrono::seconds patience,
+                                         Clock::time_point now) {
+  if (!state.end.ok()) {
+    return MessageOf(state.end);
+  }
+  if (patience.count() > 0 && state.overdue_since.has_value() &&
+      now - *state.overdue_since > patience) {
+    return fmt::format("the device hangs: told to stop, it has not come back for {} s",
+                       patience.count());
+  }
+  return std::nullopt;
+}
+
+Supervision::Supervision(GrpcServer& server, const FrameEngine& engine,
+                         PartialUploads& partial_uploads, const ParticleStore& store,
+                         const sigset_t& signals, std::chrono::seconds patience)
+    : server_(server),
+      engine_(engine),
+      partial_uploads_(partial_uploads),
+      store_(store),
+      signals_(signals),
+      patience_(patience) {}
+
+std::optional<int> Supervision::WaitForEnd() {
+  const auto heartbeat = WatchdogInterval();
+  Clock::time_point next_heartbeat = Clock::now();
+  Clock::time_point next_idle_look = Clock::now() + kIdle;
+  while (true) {
+    if (const int signal = sigtimedwait(&signals_, nullptr, &kLook); signal > 0) {
+      return signal;
+    }
+    const auto now = Clock::now();
+    if (const auto trouble = DeviceTrouble(engine_.state(), patience_, now)) {
+      Log(LogLevel::kError, "device_lost", {{"message", *trouble}});
+      return std::nullopt;
+    }
+    if (heartbeat.has_value() && now >= next_heartbeat) {
+      NotifyServiceManager("WATCHDOG=1");
+      next_heartbeat = now + *heartbeat / 2;
+    }
+    if (now >= next_idle_look) {
+      GiveMemoryBack();
+      next_idle_look = now + kIdle;
+    }
+  }
+}
+
+void Supervision::GiveMemoryBack() {
+  partial_uploads_.DropExpired();
+  const uint64_t begun = server_.calls_begun();
+  if (server_.idle() && begun == calls_seen_ && begun != given_back_) {
+    BlockCache::Release();
+    GiveBackFreedMemory();
+    given_back_ = begun;
+  }
+  calls_seen_ = begun;
+}
+
+bool Supervision::Drain(std::chrono::milliseconds most) {
+  const auto until = Clock::now() + most;
+  server_.BeginDrain();
+  while (!server_.idle() || !store_.idle()) {
+    if (sigtimedwait(&signals_, nullptr, &kDrainPoll) > 0 || Clock::now() >= until) {
+      return false;
+    }
+  }
+  return true;
+}
+
+}  // namespace halflight

@@ -1,0 +1,50 @@
+// What the main thread does while the service runs: waits for what ends it, meanwhile looks after
+// device and memory, and drains.
+#pragma once
+
+#include <chrono>
+#include <csignal>
+#include <optional>
+#include <string>
+
+#include "renderer/frame_engine.h"
+#include "server/grpc_server.h"
+#include "server/partial_uploads.h"
+#include "server/particle_store.h"
+
+namespace halflight {
+
+// What is wrong with the device so that nothing but a new process helps; none where it is well: it
+// has not come back for longer than `patience`, where that is not 0, or cannot be had again.
+std::optional<std::string> DeviceTrouble(const EngineState& state, std::chrono::seconds patience,
+                                         std::chrono::steady_clock::time_point now);
+
+class Supervision {
+ public:
+  // All outlive it; `signals` are blocked. `patience` as above.
+  Supervision(GrpcServer& server, const FrameEngine& engine, PartialUploads& partial_uploads,
+              const ParticleStore& store, const sigset_t& signals, std::chrono::seconds patience);
+
+  // The signal that ends the service; none where the device does, and that is logged. Meanwhile
+  // tells the service manager that it is well, and gives memory back: of uploads that nobody
+  // resumes, and whenever calls have stopped coming.
+  std::optional<int> WaitForEnd();
+
+  // Turns newcomers away and waits for what is under way. True when nothing is any more, and
+  // nothing waits to be written to disk; false when a second signal or the time came first.
+  bool Drain(std::chrono::milliseconds most);
+
+ private:
+  void GiveMemoryBack();
+
+  GrpcServer& server_;
+  const FrameEngine& engine_;
+  PartialUploads& partial_uploads_;
+  const ParticleStore& store_;
+  const sigset_t signals_;
+  const std::chrono::seconds patience_;
+  uint64_t calls_seen_ = 0;
+  std::optional<uint64_t> given_back_;  // after so many calls
+};
+
+}  // namespace halflight
