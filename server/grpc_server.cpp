@@ -1,8 +1,8 @@
 #include "server/grpc_server.h"
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
-#include <mutex>
 #include <utility>
 
 #include <grpc/grpc.h>
@@ -57,12 +57,7 @@ struct GrpcServer::Parts {
   std::unique_ptr<grpc::Server> server;
   std::unique_ptr<grpc::experimental::ExternalConnectionAcceptor> to_server;
   std::unique_ptr<Acceptor> acceptor;
-  std::mutex health_mutex;
-  bool serving = true;
-  bool draining = false;
-
-  // Under the mutex.
-  void TellHealth() { server->GetHealthCheckService()->SetServingStatus(serving && !draining); }
+  std::atomic<bool> serving = true;
 };
 
 GrpcServer::GrpcServer(std::unique_ptr<Parts> parts) : parts_(std::move(parts)) {}
@@ -146,23 +141,11 @@ GrpcServer::~GrpcServer() {
   parts_->server->Wait();
 }
 
-void GrpcServer::SetServing(bool serving) {
-  const std::lock_guard lock(parts_->health_mutex);
-  parts_->serving = serving;
-  parts_->TellHealth();
-}
-
-bool GrpcServer::serving() const {
-  const std::lock_guard lock(parts_->health_mutex);
-  return parts_->serving && !parts_->draining;
-}
+bool GrpcServer::serving() const { return parts_->serving; }
 
 void GrpcServer::BeginDrain() {
-  {
-    const std::lock_guard lock(parts_->health_mutex);
-    parts_->draining = true;
-    parts_->TellHealth();
-  }
+  parts_->serving = false;
+  parts_->server->GetHealthCheckService()->SetServingStatus(false);
   parts_->service.BeginDrain();
   parts_->acceptor->Stop();
 }

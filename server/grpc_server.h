@@ -45,9 +45,7 @@ class GrpcServer {
   // The addresses with the ports that were taken for 0.
   [[nodiscard]] const std::vector<std::string>& addresses() const { return addresses_; }
 
-  // What health says, of the server as a whole ("") and of halflight.v1.RenderService: true from
-  // the start on. After BeginDrain it stays false. Any thread.
-  void SetServing(bool serving);
+  // What health says, of the server as a whole ("") and of halflight.v1.RenderService. Any thread.
   [[nodiscard]] bool serving() const;
 
   // Health turns to NOT_SERVING, then nobody can connect any more and new calls are refused with

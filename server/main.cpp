@@ -161,8 +161,7 @@ int Run(const Options& options, std::vector<ListeningSocket> inherited, const si
     supervision.Drain(kAfterDeviceLost);
     std::_Exit(kExitDeviceLost);
   }
-  Log(LogLevel::kInfo, "draining",
-      {{"signal", *signal}, {"drain_seconds", options.drain_seconds}});
+  Log(LogLevel::kInfo, "draining", {{"signal", *signal}, {"drain_seconds", options.drain_seconds}});
   if (!supervision.Drain(std::chrono::seconds(options.drain_seconds))) {
     // At once: what runs may be stuck, so nothing is waited for.
     Log(LogLevel::kError, "cut_short",

@@ -16,8 +16,10 @@ absl::StatusOr<v1::QueryUploadResponse> QueryUpload(const Backend& backend,
   }
   v1::QueryUploadResponse response;
   if (backend.store.Touch(sha256)) {
+    backend.metrics.OnSetsAsked(1, 0);
     response.set_complete(true);
   } else {
+    backend.metrics.OnSetsAsked(0, 1);
     response.set_committed_bytes(backend.partial_uploads.CommittedBytes(sha256));
   }
   return response;

@@ -66,7 +66,7 @@ class Metrics {
   // A header has arrived; resumed: it goes on with what broke off.
   virtual void OnUploadBegun(bool /*resumed*/) {}
   virtual void OnUploadEnd(UploadEnd /*end*/) {}
-  // A client has asked for so many sets whether they are held.
+  // A client has asked of so many sets whether they are held.
   virtual void OnSetsAsked(size_t /*present*/, size_t /*missing*/) {}
 
   static Metrics& None() {

@@ -25,8 +25,6 @@ using Clock = std::chrono::steady_clock;
 constexpr uint32_t kMaxConnections = 16;
 constexpr int kThreads = 2;
 constexpr size_t kMaxRequestBytes = 8192;
-// Of a whole request; longer than any scraper waits.
-constexpr std::chrono::seconds kPatience{10};
 
 // False where nothing happens until then, or the peer is gone.
 bool WaitFor(int fd, short event, Clock::time_point until) {
@@ -89,7 +87,7 @@ std::string AnswerTo(std::string_view head, const MetricsServer::Page& page) {
 
 class Server final : public MetricsServer {
  public:
-  explicit Server(Page page) : page_(std::move(page)) {}
+  Server(Page page, std::chrono::seconds patience) : page_(std::move(page)), patience_(patience) {}
   ~Server() override {
     acceptor_.reset();
     const std::lock_guard lock(mutex_);
@@ -122,7 +120,7 @@ class Server final : public MetricsServer {
       }
       open_.insert(fd);
     }
-    const auto until = Clock::now() + kPatience;
+    const auto until = Clock::now() + patience_;
     if (const std::string head = ReadHead(fd, until); !head.empty()) {
       Send(fd, AnswerTo(head, page_), until);
     }
@@ -131,6 +129,7 @@ class Server final : public MetricsServer {
   }
 
   const Page page_;
+  const std::chrono::seconds patience_;
   std::mutex mutex_;
   bool closing_ = false;
   std::set<int> open_;
@@ -167,8 +166,8 @@ absl::StatusOr<std::vector<ListeningSocket>> BindMetricsAddress(const MetricsOpt
 }
 
 absl::StatusOr<std::unique_ptr<MetricsServer>> MetricsServer::Start(
-    std::vector<ListeningSocket> sockets, Page page) {
-  auto server = std::make_unique<Server>(std::move(page));
+    std::vector<ListeningSocket> sockets, Page page, std::chrono::seconds patience) {
+  auto server = std::make_unique<Server>(std::move(page), patience);
   if (absl::Status status = server->Listen(std::move(sockets)); !status.ok()) {
     return status;
   }

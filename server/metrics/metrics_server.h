@@ -2,6 +2,7 @@
 // format, nothing else. Counts nothing.
 #pragma once
 
+#include <chrono>
 #include <functional>
 #include <memory>
 #include <string>
@@ -32,9 +33,12 @@ class MetricsServer {
   // Makes the page, on one of the server's threads; by several at once.
   using Page = std::function<std::string()>;
 
+  // Of a whole request; as long as scrapers wait by default.
+  static constexpr std::chrono::seconds kPatience{10};
+
   // Unavailable where a socket cannot listen.
-  static absl::StatusOr<std::unique_ptr<MetricsServer>> Start(std::vector<ListeningSocket> sockets,
-                                                              Page page);
+  static absl::StatusOr<std::unique_ptr<MetricsServer>> Start(
+      std::vector<ListeningSocket> sockets, Page page, std::chrono::seconds patience = kPatience);
   // Hangs up on whoever is connected. `page` is not called any more when it returns.
   virtual ~MetricsServer() = default;
 };

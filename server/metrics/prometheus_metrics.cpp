@@ -12,8 +12,8 @@ namespace halflight {
 namespace {
 
 // Seconds: from a stage that is hardly there to a frame at --max-frame-seconds.
-const prometheus::Histogram::BucketBoundaries kStageSeconds = {
-    0.0005, 0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1, 2.5, 5, 10, 30, 60, 300};
+constexpr std::array kStageSeconds = {0.0005, 0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1,  0.25,
+                                      0.5,    1.0,   2.5,    5.0,   10.0, 30.0,  60.0, 300.0};
 
 constexpr std::array kUploadEnds = {"committed", "already_present", "broken_off", "refused"};
 constexpr std::array kCancellations = {"none", "client", "deadline", "stall"};
@@ -119,7 +119,9 @@ void PrometheusMetrics::Observe(const std::string& stage, double seconds) {
     const std::lock_guard lock(mutex_);
     prometheus::Histogram*& of_stage = stages_[stage];
     if (of_stage == nullptr) {
-      of_stage = &stage_seconds_.Add({{"stage", stage}}, kStageSeconds);
+      of_stage = &stage_seconds_.Add(
+          {{"stage", stage}},
+          prometheus::Histogram::BucketBoundaries(kStageSeconds.begin(), kStageSeconds.end()));
     }
     histogram = of_stage;
   }

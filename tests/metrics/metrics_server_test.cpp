@@ -2,11 +2,9 @@
 
 #include "server/metrics/metrics_server.h"
 
+#include <chrono>
 #include <memory>
-#include <optional>
 #include <string>
-#include <thread>
-#include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -30,7 +28,8 @@ class MetricsOverHttp : public ::testing::Test {
     auto sockets = BindMetricsAddress({.address = "127.0.0.1:0"});
     EXPECT_TRUE(sockets.ok()) << sockets.status();
     address_ = sockets->front().address();
-    auto server = MetricsServer::Start(*std::move(sockets), [this] { return page_; });
+    auto server = MetricsServer::Start(
+        *std::move(sockets), [this] { return page_; }, std::chrono::hours(1));
     EXPECT_TRUE(server.ok());
     server_ = *std::move(server);
   }

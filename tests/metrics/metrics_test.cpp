@@ -96,7 +96,7 @@ TEST(PrometheusMetrics, WhatHasNotHappenedYetIsZeroNotMissing) {
   }
 }
 
-class BusyEngine : public testing::FakeEngine {
+class OverdueEngine : public testing::FakeEngine {
  public:
   [[nodiscard]] EngineState state() const override {
     return {.gl_objects = 7,
@@ -108,7 +108,7 @@ class BusyEngine : public testing::FakeEngine {
 };
 
 TEST(ServerState, IsReadWhenSomebodyLooks) {
-  BusyEngine engine;
+  OverdueEngine engine;
   const ServerLimits limits{.max_queued_frames = 11};
   const std::string version = "1.2.3";
   ParticleStore store(8 << 20);
@@ -142,7 +142,6 @@ TEST(ServerState, IsReadWhenSomebodyLooks) {
   EXPECT_GT(page["process_open_fds"], 3.0);
   EXPECT_GT(page["process_start_time_seconds"], 1.6e9);
 
-  (*server)->SetServing(false);
   ParticleSet set;
   set.positions.resize(2);
   store.Insert("a", std::make_shared<const ParticleSet>(std::move(set)));
@@ -153,7 +152,6 @@ TEST(ServerState, IsReadWhenSomebodyLooks) {
   const auto reader = stub->RenderFrame(&context, testing::MakeRequest());
   ASSERT_TRUE(testing::WaitFor([&] { return engine.waiting() == 1; }));
   page = MetricsPage::Fetch(address);
-  EXPECT_EQ(page["halflight_serving"], 0.0);
   EXPECT_EQ(page["halflight_cache_sets"], 1.0);
   EXPECT_EQ(page["halflight_cache_bytes"], 24.0);
   EXPECT_EQ(page["halflight_frames_in_progress"], 1.0);
@@ -165,6 +163,8 @@ TEST(ServerState, IsReadWhenSomebodyLooks) {
   EXPECT_EQ(page["halflight_connections_accepted_total"], 1.0);
   context.TryCancel();
   EXPECT_FALSE(reader->Finish().ok());
+  (*server)->BeginDrain();
+  EXPECT_EQ(MetricsPage::Fetch(address)["halflight_serving"], 0.0);
 }
 
 }  // namespace

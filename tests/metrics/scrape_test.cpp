@@ -38,6 +38,7 @@ TEST_F(Scraped, FramesThatAreMade) {
   }
   // A call is counted when it is over for the server, a moment after the client knows.
   ASSERT_TRUE(Becomes(R"(halflight_calls_total{code="OK",rpc="RenderFrame"})", 3.0));
+  ASSERT_TRUE(Becomes(R"(halflight_calls_in_progress{rpc="RenderFrame"})", 0.0));
   const MetricsPage page = Page();
   EXPECT_EQ(page[R"(halflight_frames_total{outcome="OK",technique="half_angle",tenant="alice"})"],
             3.0);
@@ -144,6 +145,12 @@ TEST_F(Scraped, UploadsAndTheCache) {
     alice.Prepare(context);
     v1::FindMissingParticlesResponse missing;
     EXPECT_TRUE(alice.stub().FindMissingParticles(&context, question, &missing).ok());
+    grpc::ClientContext other_context;
+    alice.Prepare(other_context);
+    v1::QueryUploadRequest other_question;
+    other_question.set_sha256(header.sha256());
+    v1::QueryUploadResponse answer;
+    EXPECT_TRUE(alice.stub().QueryUpload(&other_context, other_question, &answer).ok());
   };
 
   ask();
@@ -171,8 +178,8 @@ TEST_F(Scraped, UploadsAndTheCache) {
   for (const char* end : {"committed", "already_present", "broken_off", "refused"}) {
     EXPECT_EQ(page["halflight_uploads_ended_total{end=\"" + std::string(end) + "\"}"], 1.0) << end;
   }
-  EXPECT_EQ(page[R"(halflight_particle_sets_asked_total{answer="missing"})"], 3.0);
-  EXPECT_EQ(page[R"(halflight_particle_sets_asked_total{answer="present"})"], 1.0);
+  EXPECT_EQ(page[R"(halflight_particle_sets_asked_total{answer="missing"})"], 4.0);
+  EXPECT_EQ(page[R"(halflight_particle_sets_asked_total{answer="present"})"], 2.0);
   EXPECT_EQ(page[R"(halflight_cache_lookups_total{result="hit"})"], 1.0);
   EXPECT_EQ(page[R"(halflight_cache_lookups_total{result="miss"})"], 1.0);
   EXPECT_EQ(page["halflight_cache_sets"], 1.0);

@@ -102,7 +102,7 @@ TEST(LogEvent, WhateverIsWrittenStaysOneLineWithoutControls) {
 }
 
 TEST(LogEvent, BytesThatAreNoUtf8AreReplaced) {
-  const std::string kReplaced = "\xef\xbf\xbd";
+  const std::string replaced_by = "\xef\xbf\xbd";
   struct Case {
     std::string bytes;
     int replaced;
@@ -114,7 +114,7 @@ TEST(LogEvent, BytesThatAreNoUtf8AreReplaced) {
         Case{"\xe7\x85", 2}, Case{"\xf0\x9f\x92", 3}, Case{"\xf5", 1}}) {
     std::string expected = "a";
     for (int i = 0; i < wrong.replaced; ++i) {
-      expected += kReplaced;
+      expected += replaced_by;
     }
     EXPECT_EQ(ReadText("a" + wrong.bytes + "b"), expected + "b");
     EXPECT_EQ(TextOf("a" + wrong.bytes + "b"), "\"" + expected + "b\"");
