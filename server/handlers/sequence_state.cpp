@@ -51,6 +51,7 @@ absl::StatusOr<FrameJob> SequenceState::Next(const v1::RenderFrameRequest& reque
     }
   }
   merged_.set_request_id(request.request_id());
+  merged_.set_priority(request.priority());
   auto job = ConvertFrame(merged_, *particles_, backend.limits, backend.device);
   if (job.ok() && job->target.has_value()) {
     job->target->knowledge = knowledge_;
