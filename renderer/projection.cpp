@@ -178,7 +178,10 @@ glm::dvec3 TravelDirection(const Light& light, const ParticleView& particles) {
   const auto& point = std::get<PointLight>(light.kind);
   const glm::dvec3 to_center =
       (particles.set().origin - point.position) + particles.bounds().center();
-  return to_center != glm::dvec3(0.0) ? glm::normalize(to_center) : glm::dvec3(0.0, -1.0, 0.0);
+  const double largest =
+      std::max({std::abs(to_center.x), std::abs(to_center.y), std::abs(to_center.z)});
+  // Scaled first, so that the squares do not vanish.
+  return largest > 0.0 ? glm::normalize(to_center / largest) : glm::dvec3(0.0, -1.0, 0.0);
 }
 
 Projection LightProjection(const Light& light, const ParticleView& particles, int size,

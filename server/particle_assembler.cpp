@@ -75,9 +75,9 @@ absl::StatusOr<uint64_t> CheckedPayloadBytes(const v1::ParticleLayout& layout,
     checks.Reject(field + ".attributes", "no PARTICLE_ATTRIBUTE_POSITION",
                   "a list with PARTICLE_ATTRIBUTE_POSITION");
   }
-  checks.InRange(field + ".origin.x", layout.origin().x(), kFinite);
-  checks.InRange(field + ".origin.y", layout.origin().y(), kFinite);
-  checks.InRange(field + ".origin.z", layout.origin().z(), kFinite);
+  checks.InRange(field + ".origin.x", layout.origin().x(), kOffset);
+  checks.InRange(field + ".origin.y", layout.origin().y(), kOffset);
+  checks.InRange(field + ".origin.z", layout.origin().z(), kOffset);
   if (!checks.ok()) {
     return checks.status();
   }

@@ -110,9 +110,9 @@ void AddCameraFlags(CLI::App& app, RenderOptions& options) {
   Add(app, "--target", options.target, ParseVector,
       "What the camera looks at; default: the middle of the particles", "X,Y,Z");
   Add(app, "--up", options.up, ParseVector, "What appears upward; default: 0,1,0", "X,Y,Z");
-  auto* const fov =
-      AddNumber(app, "--fov", options.fov_deg, {0, 179, "degrees, > 0 and < 179", false, false},
-                "Vertical field of view in degrees; default: 40");
+  auto* const fov = AddNumber(app, "--fov", options.fov_deg,
+                              {1e-6, 179, "degrees, >= 1e-6 and < 179", true, false},
+                              "Vertical field of view in degrees; default: 40");
   app.add_flag("--ortho", options.ortho, "Parallel projection that shows all particles")
       ->excludes(fov);
   AddNumber(app, "--ortho-height", options.ortho_height, kPositive,

@@ -97,7 +97,7 @@ double ChooseOrigin(double low, double high, double extent) {
     return centre;
   }
   const double step = std::exp2(std::floor(std::log2(extent)));
-  return std::nearbyint(centre / step) * step;
+  return std::clamp(std::nearbyint(centre / step) * step, -kLargestLength, kLargestLength);
 }
 
 }  // namespace
@@ -153,8 +153,8 @@ absl::StatusOr<Particles> ParticlesFromColumns(Columns columns) {
   high.fill(-std::numeric_limits<double>::infinity());
   for (size_t i = 0; i < columns.positions.size(); ++i) {
     const double value = columns.positions[i];
-    if (!std::isfinite(value)) {
-      return BadValue(i / 3, Attribute::kPosition, i % 3, value, "finite");
+    if (!(std::abs(value) <= kLargestLength)) {
+      return BadValue(i / 3, Attribute::kPosition, i % 3, value, "in [-1e17, 1e17]");
     }
     low[i % 3] = std::min(low[i % 3], value);
     high[i % 3] = std::max(high[i % 3], value);
@@ -190,10 +190,6 @@ absl::StatusOr<Particles> ParticlesFromColumns(Columns columns) {
   for (size_t i = 0; i < columns.positions.size(); ++i) {
     const double offset = columns.positions[i] - particles.origin[i % 3];
     particles.positions[i] = static_cast<float>(offset);
-    if (!(std::abs(offset) <= kLargestLength)) {
-      return BadValue(i / 3, Attribute::kPosition, i % 3, columns.positions[i],
-                      "at most 1e17 from the cloud's centre along each axis");
-    }
   }
   auto take = [&columns](Attribute attribute) {
     return std::move(columns.others[static_cast<size_t>(attribute)]);

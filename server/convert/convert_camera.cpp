@@ -13,6 +13,8 @@ namespace halflight {
 namespace {
 
 constexpr double kDefaultFovDeg = 40.0;
+// Below this, pixels a unit overflow 32-bit floats sooner or later, and nothing is that far away.
+constexpr double kSmallestFovDeg = 1e-6;
 constexpr uint32_t kDefaultWidth = 640;
 constexpr uint32_t kDefaultHeight = 480;
 
@@ -26,8 +28,8 @@ glm::dmat4 ConvertLookAt(const v1::LookAt& look_at, FieldChecks& checks) {
   if (!look_at.has_target()) {
     checks.Reject(path + ".target", "unset", "a point");
   }
-  const glm::dvec3 eye = ConvertVector(look_at.eye(), path + ".eye", checks);
-  const glm::dvec3 target = ConvertVector(look_at.target(), path + ".target", checks);
+  const glm::dvec3 eye = ConvertVector(look_at.eye(), path + ".eye", kPlace, checks);
+  const glm::dvec3 target = ConvertVector(look_at.target(), path + ".target", kPlace, checks);
   const glm::dvec3 up = look_at.has_up() ? ConvertDirection(look_at.up(), path + ".up", checks)
                                          : glm::dvec3(0.0, 1.0, 0.0);
   const std::optional<glm::dvec3> forward = Direction(target - eye);
@@ -49,7 +51,9 @@ glm::dmat4 ConvertWorldToCamera(const v1::Matrix4& matrix, FieldChecks& checks) 
   glm::dmat4 converted;
   for (int i = 0; i < 16; ++i) {
     const std::string element = fmt::format("{}.elements[{}]", path, i);
-    converted[i % 4][i / 4] = checks.InRange(element, matrix.elements(i), kFinite);
+    const bool translates = i % 4 == 3 && i < 12;
+    converted[i % 4][i / 4] =
+        checks.InRange(element, matrix.elements(i), translates ? kPlace : kFinite);
   }
   if (!IsRigid(converted)) {
     checks.Reject(path, "a matrix that scales, shears, mirrors or projects",
@@ -62,14 +66,15 @@ std::variant<Perspective, Orthographic> ConvertProjection(const v1::Camera& came
                                                           FieldChecks& checks) {
   if (camera.has_orthographic()) {
     return Orthographic{checks.InRange("scene.camera.orthographic.height",
-                                       camera.orthographic().height(), kPositive)};
+                                       camera.orthographic().height(),
+                                       {.low = kSmallestRadius, .high = kPlace.high})};
   }
   double degrees = camera.perspective().vertical_fov_deg();
   if (degrees == 0.0) {
     degrees = kDefaultFovDeg;
   }
   checks.InRange("scene.camera.perspective.vertical_fov_deg", degrees,
-                 {.low = 0.0, .high = 179.0, .open_low = true, .open_high = true});
+                 {.low = kSmallestFovDeg, .high = 179.0, .open_high = true});
   return Perspective{degrees * kRadiansPerDegree};
 }
 
@@ -96,15 +101,17 @@ PixelRect ConvertWindow(const v1::Camera& camera, uint32_t width, uint32_t heigh
 
 }  // namespace
 
-glm::dvec3 ConvertVector(const v1::Vector3& vector, const std::string& field, FieldChecks& checks) {
-  return {checks.InRange(field + ".x", vector.x(), kFinite),
-          checks.InRange(field + ".y", vector.y(), kFinite),
-          checks.InRange(field + ".z", vector.z(), kFinite)};
+glm::dvec3 ConvertVector(const v1::Vector3& vector, const std::string& field,
+                         const Interval& allowed, FieldChecks& checks) {
+  return {checks.InRange(field + ".x", vector.x(), allowed),
+          checks.InRange(field + ".y", vector.y(), allowed),
+          checks.InRange(field + ".z", vector.z(), allowed)};
 }
 
 glm::dvec3 ConvertDirection(const v1::Vector3& vector, const std::string& field,
                             FieldChecks& checks) {
-  const std::optional<glm::dvec3> direction = Direction(ConvertVector(vector, field, checks));
+  const std::optional<glm::dvec3> direction =
+      Direction(ConvertVector(vector, field, kFinite, checks));
   if (!direction.has_value()) {
     checks.Reject(field, "(0, 0, 0)", "a direction of any length but zero");
   }

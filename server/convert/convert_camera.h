@@ -13,8 +13,13 @@
 
 namespace halflight {
 
-// A finite vector.
-glm::dvec3 ConvertVector(const v1::Vector3& vector, const std::string& field, FieldChecks& checks);
+// Of eyes, their targets and lights: from farther away than particles may be, but not so far that
+// 32-bit floats have no square of the distance.
+inline constexpr Interval kPlace{.low = -10.0 * kLargestLength, .high = 10.0 * kLargestLength};
+
+// A vector with components in `allowed`.
+glm::dvec3 ConvertVector(const v1::Vector3& vector, const std::string& field,
+                         const Interval& allowed, FieldChecks& checks);
 
 // A unit vector along a finite vector of any length but zero.
 glm::dvec3 ConvertDirection(const v1::Vector3& vector, const std::string& field,

@@ -47,7 +47,7 @@ Light ConvertLight(const v1::Light& light, const std::string& path, FieldChecks&
     if (!light.point().has_position()) {
       checks.Reject(position, "unset", "a point");
     }
-    converted.kind = PointLight{ConvertVector(light.point().position(), position, checks),
+    converted.kind = PointLight{ConvertVector(light.point().position(), position, kPlace, checks),
                                 light.point().inverse_square_falloff()};
   } else {
     checks.Reject(path + ".kind", "unset", "directional or point");
@@ -207,7 +207,8 @@ Scene ConvertScene(const v1::Scene& scene, std::shared_ptr<const ParticleSet> pa
   converted.particles = std::move(particles);
 
   // Each part by itself.
-  converted.time_offset_s = checks.InRange("scene.time_offset_s", scene.time_offset_s(), kFinite);
+  // As a factor of velocities it is a 32-bit float.
+  converted.time_offset_s = checks.InRange("scene.time_offset_s", scene.time_offset_s(), kOffset);
   converted.sampling = ConvertSampling(scene.sampling(), checks);
   if (!scene.has_camera()) {
     checks.Reject("scene.camera", "unset", "a camera");

@@ -63,7 +63,7 @@ TEST(ReadParticles, NamesTheParticleWhoseValueIsImpossible) {
     std::vector<std::string> message;
   };
   for (const Case& bad : {
-           Case{"x,y,z\n0,0,0\n0,nan,0\n", {"particle 1", "position.y is nan", "finite"}},
+           Case{"x,y,z\n0,0,0\n0,nan,0\n", {"particle 1", "position.y is nan", "[-1e17, 1e17]"}},
            Case{"x,y,z\n0,0,-inf\n", {"particle 0", "position.z is -inf"}},
            Case{"x,y,z,radius\n0,0,0,1\n0,0,0,-2\n",
                 {"particle 1", "radius is -2", "[1e-15, 1e17]"}},
@@ -75,7 +75,8 @@ TEST(ReadParticles, NamesTheParticleWhoseValueIsImpossible) {
            Case{"x,y,\xff\n1,2,3\n", {"missing: 'z'", "found: 'x', 'y', '?'"}},
            Case{"x,y,z\n3e38,0,0\n-3e38,1,1\n", {"particle 0", "position.x is 3e+38"}},
            Case{"x,y,z,radius\n0,0,0,1e20\n", {"particle 0", "radius is 1"}},
-           Case{"x,y,z\n1e300,0,0\n-1e300,0,0\n", {"particle 0", "position.x", "at most 1e17"}},
+           Case{"x,y,z\n1e300,0,0\n-1e300,0,0\n",
+                {"particle 0", "position.x is 1e+300", "[-1e17, 1e17]"}},
        }) {
     ExpectError(ReadParticles(directory.Write("a.csv", bad.text)).status(),
                 StatusCode::kInvalidArgument, bad.message);
@@ -102,6 +103,14 @@ TEST(ReadParticles, KeepsASingleFarParticleExactly) {
   const auto particles = ReadParticles(directory.Write("a.csv", "x,y,z\n10000000.1,0,7\n"));
   ASSERT_TRUE(particles.ok()) << particles.status();
   EXPECT_EQ(particles->origin[0] + particles->positions[0], 10000000.1);
+}
+
+TEST(ReadParticles, KeepsTheOriginToWhatServersTake) {
+  const TestDirectory directory;
+  const auto particles =
+      ReadParticles(directory.Write("a.csv", "x,y,z\n1e17,0,0\n99999999999999000,0,0\n"));
+  ASSERT_TRUE(particles.ok()) << particles.status();
+  EXPECT_LE(particles->origin[0], 1e17);
 }
 
 TEST(ReadParticles, AcceptsAFileWithoutParticles) {

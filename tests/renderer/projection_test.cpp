@@ -100,6 +100,20 @@ INSTANTIATE_TEST_SUITE_P(Lights, LightCamera,
                                          LightCase{"PointNear", Bulb({0, 1.5, 0.2})}),
                          [](const auto& param) { return param.param.name; });
 
+TEST(TravelDirection, IsOfUnitLengthHoweverNearTheLightIs) {
+  Scene scene = test::BallScene(1);
+  auto set = std::make_shared<ParticleSet>();
+  set->positions = {glm::vec3(0.0F)};
+  scene.particles = set;
+  scene.material.radius = 1.0F;
+  const ParticleView particles(scene);
+  for (const double near : {1e-160, 1e-300, 5e-324}) {
+    EXPECT_NEAR(glm::length(TravelDirection(Bulb({0.0, near, near}), particles)), 1.0, 1e-12)
+        << near;
+  }
+  EXPECT_EQ(TravelDirection(Bulb(glm::dvec3(0.0)), particles), glm::dvec3(0.0, -1.0, 0.0));
+}
+
 TEST(EyeProjection, PutsTheTargetInTheMiddleAndUpAtTheTop) {
   const Camera camera = test::LookAt({3, 1, 4}, {0, 1, 0}, 200, 100);
   const glm::dmat4 ndc = EyeProjection(camera, {200, 100}, 1.0).texture_from_world();

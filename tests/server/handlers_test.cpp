@@ -405,6 +405,18 @@ TEST_F(Sequence, UnsetPartsAreThoseOfTheRequestBefore) {
   EXPECT_EQ(last.images[0].kind, ImageKind::kCoverage);
 }
 
+TEST_F(Sequence, PriorityIsThatOfTheRequestItself) {
+  SequenceState state;
+  v1::RenderFrameRequest request = MakeRequest();
+  request.set_priority(7);
+  EXPECT_EQ(state.Next(request, backend_)->priority, 7);
+  v1::RenderFrameRequest same;
+  EXPECT_EQ(state.Next(same, backend_)->priority, 0);
+  same.set_priority(101);
+  EXPECT_THAT(std::string(state.Next(same, backend_).status().message()),
+              HasSubstr("priority: 101"));
+}
+
 TEST_F(Sequence, MeasurementIsKeptUntilAnotherTakesItsPlace) {
   v1::RenderFrameRequest second;
   second.mutable_measure_error()->set_samples(64);

@@ -99,6 +99,18 @@ INSTANTIATE_TEST_SUITE_P(
         Refusal{"EyeNan",
                 [](Request& r) { CameraOf(r).mutable_look_at()->mutable_eye()->set_y(kNan); },
                 "scene.camera.look_at.eye.y: nan"},
+        // Of such distances 32 bits have no squares, and 64 bits not always the distance.
+        Refusal{"EyeTooFar",
+                [](Request& r) { CameraOf(r).mutable_look_at()->mutable_eye()->set_x(1e300); },
+                "scene.camera.look_at.eye.x: 1e+300, allowed: [-1e+18, 1e+18]"},
+        Refusal{"TargetTooFar",
+                [](Request& r) { CameraOf(r).mutable_look_at()->mutable_target()->set_x(-1e19); },
+                "scene.camera.look_at.target.x: -1e+19, allowed: [-1e+18, 1e+18]"},
+        Refusal{"MatrixTooFar",
+                [](Request& r) {
+                  UseMatrix(r, {1, 0, 0, 0, 0, 1, 0, 1e308, 0, 0, 1, 0, 0, 0, 0, 1});
+                },
+                "scene.camera.world_to_camera.elements[7]: 1e+308, allowed: [-1e+18, 1e+18]"},
         Refusal{"EyeIsTarget",
                 [](Request& r) { CameraOf(r).mutable_look_at()->mutable_target()->set_z(10.0); },
                 "scene.camera.look_at.target: (0, 0, 10)"},
@@ -131,10 +143,14 @@ INSTANTIATE_TEST_SUITE_P(
                 "scene.camera.world_to_camera: "},
         Refusal{"FovTooWide",
                 [](Request& r) { CameraOf(r).mutable_perspective()->set_vertical_fov_deg(200); },
-                "scene.camera.perspective.vertical_fov_deg: 200, allowed: (0, 179)"},
+                "scene.camera.perspective.vertical_fov_deg: 200, allowed: [1e-06, 179)"},
         Refusal{"FovAtTheEnd",
                 [](Request& r) { CameraOf(r).mutable_perspective()->set_vertical_fov_deg(179); },
                 "scene.camera.perspective.vertical_fov_deg: 179"},
+        // Pixels a unit are infinite in 32 bits.
+        Refusal{"FovTooNarrow",
+                [](Request& r) { CameraOf(r).mutable_perspective()->set_vertical_fov_deg(1e-300); },
+                "scene.camera.perspective.vertical_fov_deg: 1e-300, allowed: [1e-06, 179)"},
         Refusal{"FovNegative",
                 [](Request& r) { CameraOf(r).mutable_perspective()->set_vertical_fov_deg(-1); },
                 "scene.camera.perspective.vertical_fov_deg: -1"},
@@ -143,6 +159,9 @@ INSTANTIATE_TEST_SUITE_P(
                 "scene.camera.perspective.vertical_fov_deg: nan"},
         Refusal{"OrthographicWithoutHeight", [](Request& r) { CameraOf(r).mutable_orthographic(); },
                 "scene.camera.orthographic.height: 0"},
+        Refusal{"OrthographicTooSmall",
+                [](Request& r) { CameraOf(r).mutable_orthographic()->set_height(1e-300); },
+                "scene.camera.orthographic.height: 1e-300, allowed: [1e-15, 1e+18]"},
         Refusal{"TooWide", [](Request& r) { CameraOf(r).set_width(4097); },
                 "scene.camera.width: 4097, allowed: [1, 4096]"},
         Refusal{"TooHigh", [](Request& r) { CameraOf(r).set_height(4294967295U); },
@@ -199,6 +218,8 @@ INSTANTIATE_TEST_SUITE_P(
                 "scene.lighting.lights[0].point.position: unset"},
         Refusal{"PositionInfinite", [](Request& r) { UsePointLight(r, kInf); },
                 "scene.lighting.lights[0].point.position.x: inf"},
+        Refusal{"PositionTooFar", [](Request& r) { UsePointLight(r, 1e200); },
+                "scene.lighting.lights[0].point.position.x: 1e+200, allowed: [-1e+18, 1e+18]"},
         Refusal{"PointAmongTheParticles", [](Request& r) { UsePointLight(r, 0.5); },
                 "scene.lighting.lights[0].point.position: "},
         Refusal{"ColorNegative", [](Request& r) { LightOf(r).mutable_color()->set_g(-1.0F); },
@@ -269,6 +290,17 @@ INSTANTIATE_TEST_SUITE_P(
         Refusal{"TimeWithoutVelocity",
                 [](Request& r) { r.mutable_scene()->set_time_offset_s(0.5); },
                 "scene.time_offset_s: 0.5"},
+        // In 32 bits infinite, and times a velocity of zero no number: it would move nothing, far
+        // away.
+        Refusal{
+            "TimeTooLarge",
+            [](Request& r) {
+              UseParticles(r, {v1::PARTICLE_ATTRIBUTE_POSITION, v1::PARTICLE_ATTRIBUTE_VELOCITY});
+              MaterialOf(r).set_radius(1.0F);
+              for (size_t i = 6; i < 12; ++i) Poke(r, i, 0.0);
+              r.mutable_scene()->set_time_offset_s(1e300);
+            },
+            "scene.time_offset_s: 1e+300, allowed: [-1e+17, 1e+17]"},
         Refusal{"TimeNan", [](Request& r) { r.mutable_scene()->set_time_offset_s(kNan); },
                 "scene.time_offset_s: nan"},
         Refusal{"TechniqueUnknown",
@@ -429,6 +461,9 @@ INSTANTIATE_TEST_SUITE_P(
         Refusal{"OriginNan",
                 [](Request& r) { ParticlesOf(r).mutable_layout()->mutable_origin()->set_z(kNan); },
                 "scene.inline_particles.layout.origin.z: nan"},
+        Refusal{"OriginTooFar",
+                [](Request& r) { ParticlesOf(r).mutable_layout()->mutable_origin()->set_x(1e18); },
+                "scene.inline_particles.layout.origin.x: 1e+18, allowed: [-1e+17, 1e+17]"},
         Refusal{"PayloadShort", [](Request& r) { ParticlesOf(r).mutable_payload()->pop_back(); },
                 "scene.inline_particles.payload: 31 bytes, allowed: 32 bytes"},
         Refusal{"PositionNan", [](Request& r) { Poke(r, 4, kNan); },
