@@ -86,6 +86,7 @@ class Clients {
 
 struct Losses {
   size_t whole = 0;
+  size_t accepted = 0;      // as the log says
   size_t refused = 0;       // UNAVAILABLE, before anything had come
   size_t unfinished = 0;    // something had come, not all
   size_t otherwise = 0;     // refused with another code
@@ -104,6 +105,7 @@ void ReadLog(const std::string& log, const std::map<std::string, Seen>& seen, Lo
     if (line.find(" size=") == std::string::npos) {
       continue;
     }
+    ++losses.accepted;
     const auto found = seen.find(id);
     losses.never_came += found == seen.end() || !found->second.whole ? 1 : 0;
     losses.not_finished += line.find("outcome=OK") == std::string::npos ? 1 : 0;
@@ -153,6 +155,8 @@ void RunRestarts(Run& run) {
   run.report.AtLeast("restarts by SIGTERM under load", restarts, restarts, "");
   run.report.None("exit codes other than 0", other_exits);
   run.report.AtLeast("frames that came whole", static_cast<double>(losses.whole), 4 * restarts, "");
+  run.report.AtLeast("frames that the log says were accepted", static_cast<double>(losses.accepted),
+                     static_cast<double>(losses.whole), "");
   run.report.Tell("refused with UNAVAILABLE", static_cast<double>(losses.refused), "");
   run.report.None("frames that began to come and did not end", losses.unfinished);
   run.report.None("refused with another code", losses.otherwise);

@@ -1,10 +1,12 @@
 // Uploads whose clients, or whose server, are killed: what had come is not sent again, and no set
 // is ever another than its name says.
 
+#include <algorithm>
 #include <chrono>
 #include <csignal>
 #include <filesystem>
 #include <random>
+#include <stop_token>
 #include <string>
 #include <thread>
 #include <vector>
@@ -49,6 +51,11 @@ v1::QueryUploadResponse Query(v1::RenderService::Stub& stub, const std::string& 
 
 std::string FileOf(const std::string& cache, const std::string& sha256) {
   return cache + "/" + ToHex(sha256) + ".particles";
+}
+
+bool HasSets(const std::string& cache) {
+  return std::any_of(fs::directory_iterator(cache), fs::directory_iterator(),
+                     [](const auto& entry) { return entry.path().extension() == ".particles"; });
 }
 
 // Half of it is not what was written, as after a write that the disk has lost.
@@ -137,7 +144,7 @@ void RunUploadServersKilled(Run& run) {
   const auto below = [&random](size_t n) {
     return std::uniform_int_distribution<size_t>(0, n - 1)(random);
   };
-  const int kills = run.Of(200, 6);
+  const int kills = run.Of(200, 4);
   size_t whole = 0;
   size_t corrupt = 0;
   size_t others = 0;
@@ -156,18 +163,23 @@ void RunUploadServersKilled(Run& run) {
         ++corrupt;
       }
     }
+    std::stop_source gone;
     std::jthread client_thread([&, order = below(sets.size())] {
       client::ClientOptions once;
-      once.timeout = std::chrono::seconds(1);
+      once.stop = gone.get_token();
       once.max_attempts = 1;
       auto client = client::Client::Connect(address, once);
       for (size_t i = 0; i < sets.size(); ++i) {
         client->EnsureUploaded(sets[(i + order) % sets.size()]).IgnoreError();
       }
     });
+    if (kill % 2 == 0) {  // so that there is something to find, however slow the machine
+      Require(WaitFor([&] { return HasSets(cache); }), "a set on disk");
+    }
     std::this_thread::sleep_for(std::chrono::milliseconds(below(200)));
     server.Signal(SIGKILL);
     Require(server.Wait() == -1, "the server was to be killed");
+    gone.request_stop();  // a call that has begun to connect would wait for its deadline
     client_thread.join();
     // So that there is always something to write.
     fs::remove(FileOf(cache, sets[below(sets.size())].sha256));
