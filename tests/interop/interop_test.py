@@ -162,7 +162,7 @@ class Interop(unittest.TestCase):
         time.sleep(1)
         self.assertEqual(said_by(client)["code"], "CANCELLED")
         self.assertTrue(wait_for(lambda: any(
-            b'"unwanted"' in line and b"outcome=CANCELLED" in line
+            b"request_id=unwanted " in line and b"outcome=CANCELLED" in line
             for line in (self.folder / "log").read_bytes().splitlines())))
         request, common, outputs = self.request("half_angle")
         self.expect_equal(self.cpp_files(common, outputs), self.client_files(request, outputs)[0])

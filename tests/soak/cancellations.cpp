@@ -5,6 +5,8 @@
 #include <chrono>
 #include <cmath>
 #include <random>
+#include <sstream>
+#include <string>
 #include <thread>
 #include <vector>
 
@@ -60,11 +62,14 @@ void CancelMany(const std::vector<std::shared_ptr<grpc::Channel>>& channels,
   }
 }
 
-// What the log says of frames that ended CANCELLED: those that the renderer had begun have waited.
-size_t CountInLog(const std::string& log, const std::string& text) {
+// Frames that had been accepted and ended CANCELLED: those have their sizes in the log.
+size_t CancelledFrames(const std::string& log) {
   size_t count = 0;
-  for (size_t at = log.find(text); at != std::string::npos; at = log.find(text, at + 1)) {
-    ++count;
+  std::istringstream lines(log);
+  for (std::string line; std::getline(lines, line);) {
+    const bool accepted = line.find(" frame request_id=") != std::string::npos &&
+                          line.find(" size=") != std::string::npos;
+    count += accepted && line.find("outcome=CANCELLED") != std::string::npos ? 1 : 0;
   }
   return count;
 }
@@ -132,7 +137,7 @@ void RunCancellations(Run& run) {
   run.report.AtLeast("calls cancelled", moments.cancelled, run.Of(10000, 250), "");
   run.report.Tell("of these while being sent", moments.while_sent, "");
   run.report.Tell("of these after the server had accepted the frame, before it was encoded",
-                  static_cast<double>(CountInLog(log, "outcome=CANCELLED")), "");
+                  static_cast<double>(CancelledFrames(log)), "");
   run.report.Tell("answered before they were cancelled", moments.too_late, "");
   run.report.None("ended neither with a frame nor CANCELLED", moments.otherwise);
   run.report.AtMost("descriptors more", after.descriptors - before.descriptors, 0, "");

@@ -97,10 +97,10 @@ struct Losses {
 // A frame that was accepted has a line with its sizes, whatever became of it; one that was refused
 // has none of them.
 void ReadLog(const std::string& log, const std::map<std::string, Seen>& seen, Losses& losses) {
-  const std::string key = "frame request_id=\"";
+  const std::string key = " frame request_id=";
   for (size_t at = log.find(key); at != std::string::npos; at = log.find(key, at + 1)) {
     const size_t id_at = at + key.size();
-    const std::string id = log.substr(id_at, log.find('"', id_at) - id_at);
+    const std::string id = log.substr(id_at, log.find(' ', id_at) - id_at);
     const std::string line = log.substr(at, log.find('\n', at) - at);
     if (line.find(" size=") == std::string::npos) {
       continue;
