@@ -2,7 +2,6 @@
 
 #include <array>
 #include <atomic>
-#include <unordered_map>
 
 namespace halflight::gl {
 
@@ -10,25 +9,6 @@ namespace {
 
 std::atomic<uint64_t> held_objects = 0;
 std::atomic<uint64_t> held_bytes = 0;
-
-// Bytes by name: names are of the context, and contexts of one thread.
-using Sizes = std::unordered_map<GLuint, size_t>;
-thread_local Sizes buffer_sizes;
-thread_local Sizes texture_sizes;
-
-void Count(Sizes& sizes, GLuint name, size_t bytes) {
-  if (name == 0) return;  // of a context that was lost
-  sizes[name] = bytes;
-  ++held_objects;
-  held_bytes += bytes;
-}
-
-void Uncount(Sizes& sizes, GLuint name) {
-  const auto size = sizes.extract(name);
-  if (size.empty()) return;
-  --held_objects;
-  held_bytes -= size.mapped();
-}
 
 Buffer MakeImmutableBuffer(const char* label, size_t bytes, const void* contents,
                            GLbitfield flags) {
@@ -38,8 +18,7 @@ Buffer MakeImmutableBuffer(const char* label, size_t bytes, const void* contents
   const size_t size = bytes == 0 ? sizeof(float) : bytes;
   glNamedBufferStorage(name, static_cast<GLsizeiptr>(size), bytes == 0 ? nullptr : contents, flags);
   glObjectLabel(GL_BUFFER, name, -1, label);
-  Count(buffer_sizes, name, size);
-  return Buffer(name);
+  return Buffer(name, size);
 }
 
 // As the device keeps it.
@@ -55,7 +34,7 @@ size_t BytesOf(GLuint texture, const TextureInfo& info) {
          static_cast<size_t>(info.layers > 0 ? info.layers : 1) * bits / 8;
 }
 
-GLuint CreateTexture(const TextureInfo& info) {
+Object<TextureTraits> CreateTexture(const TextureInfo& info) {
   GLuint name = 0;
   glCreateTextures(info.layers > 0 ? GL_TEXTURE_2D_ARRAY : GL_TEXTURE_2D, 1, &name);
   if (info.layers > 0) {
@@ -68,23 +47,22 @@ GLuint CreateTexture(const TextureInfo& info) {
   glTextureParameteri(name, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
   glTextureParameteri(name, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
   glObjectLabel(GL_TEXTURE, name, -1, info.label);
-  Count(texture_sizes, name, BytesOf(name, info));
-  return name;
+  return Object<TextureTraits>(name, BytesOf(name, info));
 }
 
 }  // namespace
 
-void BufferTraits::Delete(GLuint name) {
-  Uncount(buffer_sizes, name);
-  glDeleteBuffers(1, &name);
-}
-
-void TextureTraits::Delete(GLuint name) {
-  Uncount(texture_sizes, name);
-  glDeleteTextures(1, &name);
-}
-
 Held HeldMemory() { return {held_objects, held_bytes}; }
+
+void CountHeld(size_t bytes) {
+  ++held_objects;
+  held_bytes += bytes;
+}
+
+void UncountHeld(size_t bytes) {
+  --held_objects;
+  held_bytes -= bytes;
+}
 
 Buffer MakeBuffer(const char* label, std::span<const std::byte> contents) {
   return MakeImmutableBuffer(label, contents.size(), contents.data(), 0);

@@ -14,21 +14,38 @@
 
 namespace halflight::gl {
 
+// What all buffers and textures of the process are at the moment. Any thread.
+struct Held {
+  uint64_t objects = 0;
+  uint64_t bytes = 0;
+};
+Held HeldMemory();
+// One more, or one less.
+void CountHeld(size_t bytes);
+void UncountHeld(size_t bytes);
+
 // Owns the name of one GL object. Traits::Delete deletes it.
 template <typename Traits>
 class Object {
  public:
   Object() = default;
-  explicit Object(GLuint name) : name_(name) {}
-  Object(Object&& other) noexcept : name_(std::exchange(other.name_, 0)) {}
+  // `bytes`: of memory that counts as held, where it is not 0.
+  explicit Object(GLuint name, size_t bytes = 0) : name_(name), bytes_(bytes) {
+    if (name_ != 0 && bytes_ != 0) CountHeld(bytes_);
+  }
+  Object(Object&& other) noexcept
+      : name_(std::exchange(other.name_, 0)), bytes_(std::exchange(other.bytes_, 0)) {}
   Object& operator=(Object&& other) noexcept {
     std::swap(name_, other.name_);
+    std::swap(bytes_, other.bytes_);
     return *this;
   }
   Object(const Object&) = delete;
   Object& operator=(const Object&) = delete;
   ~Object() {
-    if (name_ != 0) Traits::Delete(name_);
+    if (name_ == 0) return;
+    if (bytes_ != 0) UncountHeld(bytes_);
+    Traits::Delete(name_);
   }
 
   [[nodiscard]] GLuint name() const { return name_; }
@@ -36,13 +53,14 @@ class Object {
 
  private:
   GLuint name_ = 0;
+  size_t bytes_ = 0;
 };
 
 struct BufferTraits {
-  static void Delete(GLuint name);
+  static void Delete(GLuint name) { glDeleteBuffers(1, &name); }
 };
 struct TextureTraits {
-  static void Delete(GLuint name);
+  static void Delete(GLuint name) { glDeleteTextures(1, &name); }
 };
 struct FramebufferTraits {
   static void Delete(GLuint name) { glDeleteFramebuffers(1, &name); }
@@ -66,13 +84,6 @@ using VertexArray = Object<VertexArrayTraits>;
 using Program = Object<ProgramTraits>;
 using Shader = Object<ShaderTraits>;
 using Query = Object<QueryTraits>;
-
-// What all buffers and textures of the process are at the moment. Any thread.
-struct Held {
-  uint64_t objects = 0;
-  uint64_t bytes = 0;
-};
-Held HeldMemory();
 
 // A buffer of fixed size and contents.
 Buffer MakeBuffer(const char* label, std::span<const std::byte> contents);
