@@ -194,7 +194,7 @@ TEST(Cli, WrongFlagsAreToldByNameAndValue) {
   };
   const std::string plume = PlumePath("0024");
   for (const Case& wrong :
-       {Case{{}, "subcommand"}, Case{{"render", plume}, "--output"},
+       {Case{{}, "command: none is given"}, Case{{"render", plume}, "--output"},
         Case{{"render", plume, "-o", "f.jpeg"}, ".jpeg"},
         Case{{"render", plume, "-o", "f.png", "--size", "80"}, "--size"},
         Case{{"render", plume, "-o", "f.png", "--opacity", "1.5"}, "1.5"},

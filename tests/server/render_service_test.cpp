@@ -362,7 +362,7 @@ TEST_F(Service, InvalidRequestNamesTheField) {
   const grpc::Status status = RenderAll(request);
   EXPECT_EQ(status.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
   EXPECT_EQ(status.error_message(),
-            "scene.camera.perspective.vertical_fov_deg: 200, allowed: (0, 179)");
+            "scene.camera.perspective.vertical_fov_deg: 200, allowed: [1e-06, 179)");
 }
 
 TEST_F(Service, DrainFinishesWhatRunsAndRefusesTheRest) {
