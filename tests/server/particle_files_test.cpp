@@ -10,7 +10,6 @@
 #include <thread>
 #include <vector>
 
-#include <sys/mount.h>
 #include <unistd.h>
 
 #include <gmock/gmock.h>
@@ -21,6 +20,7 @@
 #include "server/particle_upload.h"
 #include "server/status_text.h"
 #include "tests/process/process.h"
+#include "tests/process/small_disk.h"
 #include "tests/process/wait_for.h"
 #include "tests/server/made_particles.h"
 
@@ -342,30 +342,8 @@ TEST_F(Files, ManyThreadsAtOnceGetTheRightSetOrNone) {
   EXPECT_GT(files->bytes(), 0U);
 }
 
-// A small file system of its own, gone with the object.
-class SmallDisk {
- public:
-  SmallDisk(std::string path, const std::string& size) : path_(std::move(path)) {
-    fs::create_directory(path_);
-    mounted_ = mount("tmpfs", path_.c_str(), "tmpfs", 0, ("size=" + size).c_str()) == 0;
-  }
-  ~SmallDisk() {
-    if (mounted_) {
-      umount2(path_.c_str(), MNT_DETACH);
-    }
-  }
-  SmallDisk(const SmallDisk&) = delete;
-  SmallDisk& operator=(const SmallDisk&) = delete;
-
-  [[nodiscard]] bool mounted() const { return mounted_; }
-
- private:
-  std::string path_;
-  bool mounted_ = false;
-};
-
 TEST_F(Files, FullDiskCostsTheOldestSetsOrTheNewOneAndNothingElse) {
-  const SmallDisk disk(path_, "256k");
+  const testing::SmallDisk disk(path_, "256k");
   if (!disk.mounted()) {
     GTEST_SKIP() << "no file system may be mounted here";
   }

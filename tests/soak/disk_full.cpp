@@ -1,6 +1,5 @@
 // A cache directory on a disk that is full: sets are refused a file, never given a wrong one.
 
-#include <sys/mount.h>
 #include <sys/resource.h>
 #include <unistd.h>
 
@@ -13,7 +12,9 @@
 #include "client/client.h"
 #include "halflight/sha256.h"
 #include "tests/access/health.h"
+#include "tests/process/small_disk.h"
 #include "tests/process/wait_for.h"
+#include "tests/soak/cache_dir.h"
 #include "tests/soak/scenario.h"
 #include "tests/soak/scene.h"
 #include "tests/soak/server.h"
@@ -22,29 +23,6 @@ namespace halflight::soak {
 namespace {
 
 namespace fs = std::filesystem;
-
-// A folder with room for little: a file system of its own where that is allowed.
-class SmallDisk {
- public:
-  SmallDisk(const testing::Folder& folder, const std::string& size) : path_(folder / "disk") {
-    fs::create_directory(path_);
-    mounted_ = mount("tmpfs", path_.c_str(), "tmpfs", 0, ("size=" + size).c_str()) == 0;
-  }
-  ~SmallDisk() {
-    if (mounted_) {
-      umount2(path_.c_str(), MNT_DETACH);
-    }
-  }
-  SmallDisk(const SmallDisk&) = delete;
-  SmallDisk& operator=(const SmallDisk&) = delete;
-
-  [[nodiscard]] const std::string& path() const { return path_; }
-  [[nodiscard]] bool mounted() const { return mounted_; }
-
- private:
-  std::string path_;
-  bool mounted_ = false;
-};
 
 // Files named like sets that are not those sets.
 size_t DamagedFiles(const std::string& cache, size_t& whole) {
@@ -59,21 +37,11 @@ size_t DamagedFiles(const std::string& cache, size_t& whole) {
   return damaged;
 }
 
-// Whoever writes to the disk without looking at what write(2) says.
-void DamageAFile(const std::string& cache) {
-  for (const auto& entry : fs::directory_iterator(cache)) {
-    if (entry.path().extension() == ".particles") {
-      fs::resize_file(entry.path(), fs::file_size(entry.path()) / 2);
-      return;
-    }
-  }
-}
-
 }  // namespace
 
 void RunDiskFull(Run& run) {
   const testing::Folder folder;
-  const SmallDisk disk(folder, "3m");
+  const testing::SmallDisk disk(folder / "disk", "3m");
   const std::string cache = disk.path() + "/cache";
   const std::string program = run.sabotage ? "halflightd_broken" : "halflightd";
   std::vector<std::string> flags = {"--cache-dir", cache};

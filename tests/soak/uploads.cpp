@@ -20,6 +20,7 @@
 #include "tests/process/wait_for.h"
 #include "tests/server/made_particles.h"
 #include "tests/server/upload_messages.h"
+#include "tests/soak/cache_dir.h"
 #include "tests/soak/scenario.h"
 #include "tests/soak/scene.h"
 #include "tests/soak/server.h"
@@ -56,16 +57,6 @@ std::string FileOf(const std::string& cache, const std::string& sha256) {
 bool HasSets(const std::string& cache) {
   return std::any_of(fs::directory_iterator(cache), fs::directory_iterator(),
                      [](const auto& entry) { return entry.path().extension() == ".particles"; });
-}
-
-// Half of it is not what was written, as after a write that the disk has lost.
-void DamageAFile(const std::string& cache) {
-  for (const auto& entry : fs::directory_iterator(cache)) {
-    if (entry.path().extension() == ".particles") {
-      fs::resize_file(entry.path(), fs::file_size(entry.path()) / 2);
-      return;
-    }
-  }
 }
 
 }  // namespace
