@@ -76,7 +76,7 @@ class RenderThread : public FrameEngine {
   std::optional<Job> NextJob(const FrameRenderer& renderer, const Flights& flights);
   Flight Begin(FrameRenderer& renderer, Job job);
   void Finish(FrameRenderer& renderer, Flights& flights);
-  void Answer(Flight& flight, absl::StatusOr<FrameResult> frame);
+  void Answer(const Done& done, absl::StatusOr<FrameResult> frame);
 
   const RenderThreadOptions options_;
   DeviceInfo device_;         // set before the engine serves
@@ -176,12 +176,12 @@ RenderThread::Flight RenderThread::Begin(FrameRenderer& renderer, Job job) {
   return flight;
 }
 
-void RenderThread::Answer(Flight& flight, absl::StatusOr<FrameResult> frame) {
+void RenderThread::Answer(const Done& done, absl::StatusOr<FrameResult> frame) {
   {
     const std::lock_guard lock(mutex_);
     --unfinished_;
   }
-  flight.job.done(std::move(frame));
+  done(std::move(frame));
 }
 
 // The oldest.
@@ -189,15 +189,15 @@ void RenderThread::Finish(FrameRenderer& renderer, Flights& flights) {
   Flight flight = std::move(flights.frames.front());
   flights.frames.pop_front();
   if (!flight.frame.ok()) {
-    Answer(flight, flight.frame.status());
+    Answer(flight.job.done, flight.frame.status());
   } else if (flight.job.stop.stop_requested() && !FrameRenderer::IsDrawn(**flight.frame, {})) {
-    Answer(flight, absl::CancelledError("frame cancelled"));
+    Answer(flight.job.done, absl::CancelledError("frame cancelled"));
     flights.cancelled.push_back(std::move(flight));
   } else {
     absl::StatusOr<FrameResult> frame = renderer.Finish(*std::move(flight.frame));
     flight.watched.reset();
     if (frame.ok()) frame->timings.insert(frame->timings.begin(), {"queue", flight.queued_ms});
-    Answer(flight, std::move(frame));
+    Answer(flight.job.done, std::move(frame));
   }
 }
 
@@ -207,7 +207,7 @@ absl::Status RenderThread::Serve(FrameRenderer& renderer) {
   Flights flights;
   for (;;) {
     if (absl::Status reset = renderer.CheckReset(); !reset.ok()) {
-      for (Flight& flight : flights.frames) Answer(flight, reset);
+      for (const Flight& flight : flights.frames) Answer(flight.job.done, reset);
       return reset;
     }
     std::erase_if(flights.cancelled,
@@ -238,10 +238,7 @@ void RenderThread::End(const absl::Status& why) {
     end_ = why;
     jobs.swap(jobs_);
   }
-  for (Job& job : jobs) {
-    Flight flight{std::move(job), false, 0.0, nullptr, why};
-    Answer(flight, why);
-  }
+  for (const Job& job : jobs) Answer(job.done, why);
 }
 
 // Ends where there is a job: what a request wants goes before what others may want.
