@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "renderer/parallel.h"
+#include "renderer/pixel_memory.h"
 
 namespace halflight {
 
@@ -24,7 +25,7 @@ Image MapPixels(const Image& source, std::vector<std::string> channels, const Va
   const size_t pixels = PixelCount(source);
   const size_t from = source.channels.size();
   const size_t to = image.channels.size();
-  image.pixels.resize(pixels * to);
+  image.pixels = Zeros(pixels * to);
   ParallelRanges(pixels, [&](const WorkRange& range) {
     for (size_t i = range.begin; i < range.end; ++i) {
       value(&source.pixels[i * from], &image.pixels[i * to]);

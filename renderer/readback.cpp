@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "renderer/pixel_memory.h"
+
 namespace halflight {
 
 namespace {
@@ -31,10 +33,13 @@ void AddColors(const float* from, size_t count, float* to) {
 void Place(const float* pixels, const glm::ivec2& size, const ImagePlace& to) {
   Image& image = to.image;
   if (IsWhole(to, size) && !to.add) {
-    image.pixels.assign(pixels, pixels + ValueCount(image, size));
+    ReservePixels(ValueCount(image), image.pixels);
+    image.pixels.assign(pixels, pixels + ValueCount(image));
     return;
   }
-  image.pixels.resize(ValueCount(image) * static_cast<size_t>(image.layers));
+  if (image.pixels.empty()) {
+    image.pixels = Zeros(ValueCount(image) * static_cast<size_t>(image.layers));
+  }
   const size_t channels = image.channels.size();
   const size_t row_values = channels * static_cast<size_t>(size.x);
   const size_t layer = ValueCount(image) * static_cast<size_t>(to.layer);
@@ -73,7 +78,7 @@ void GetPixels(const gl::Texture& texture, const PixelRect& from, int layer, GLe
 template <typename Get>
 void PlaceNow(const glm::ivec2& size, const ImagePlace& to, const Get& get) {
   if (IsWhole(to, size) && !to.add) {
-    to.image.pixels.resize(ValueCount(to.image));
+    to.image.pixels = Zeros(ValueCount(to.image));
     get(to.image.pixels.data());
     return;
   }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 
+#include "renderer/pixel_memory.h"
 #include "renderer/sweep/tile_work.h"
 
 namespace halflight::sweep {
@@ -12,9 +13,9 @@ namespace {
 constexpr float kLeastTransmittance = 1e-6F;
 constexpr int kPlane = kImageTile * kImageTile;
 
-Image MakeTarget(const glm::ivec2& size) {
+Image MakeTarget(const glm::ivec2& size, const std::stop_token& stop) {
   Image image{size.x, size.y, 1, {"R", "G", "B", "A"}, {}};
-  image.pixels.resize(static_cast<size_t>(size.x) * size.y * 4);
+  image.pixels = Zeros(static_cast<size_t>(size.x) * size.y * 4, stop);
   return image;
 }
 
@@ -52,11 +53,13 @@ void WriteTile(const Planes& planes, const glm::ivec2& corner, Image& image) {
 
 }  // namespace
 
-Composite MakeComposite(const glm::ivec2& size, bool keep_depth, size_t slots) {
+Composite MakeComposite(const glm::ivec2& size, bool keep_depth, size_t slots,
+                        const std::stop_token& stop) {
   Composite composite;
-  composite.beauty = MakeTarget(size);
-  if (keep_depth) composite.depth = MakeTarget(size);
-  composite.transmittance.assign(slots, MakeTarget(size));
+  composite.beauty = MakeTarget(size, stop);
+  if (keep_depth) composite.depth = MakeTarget(size, stop);
+  composite.transmittance.resize(slots);
+  for (Image& image : composite.transmittance) image = MakeTarget(size, stop);
   return composite;
 }
 

@@ -19,8 +19,10 @@ struct Composite {
   std::vector<Image> transmittance;  // by slot: R G B * alpha, alpha; empty unless kept
 };
 
-// Nothing covered; with transmittance for `slots` of Shading::lights.
-Composite MakeComposite(const glm::ivec2& size, bool keep_depth, size_t slots);
+// Nothing covered; with transmittance for `slots` of Shading::lights. Once `stop` was requested,
+// images without all of their pixels.
+Composite MakeComposite(const glm::ivec2& size, bool keep_depth, size_t slots,
+                        const std::stop_token& stop = {});
 
 // Draws a shaded run behind what `composite` shows; `tiles` lists the run's rectangles. Leaves out
 // of a pixel what lies behind a coverage of 1 - 1e-6, once all pixels of its tile have that: an

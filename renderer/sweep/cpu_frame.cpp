@@ -230,11 +230,14 @@ absl::StatusOr<DrawnFrame> DrawOnCpu(const DrawContext& context) {
   const auto list = SpritesOf(context, list_key, frame);
   if (!list.ok()) return list.status();
 
-  // Run by run, shade them and draw them behind those that are nearer.
+  clock.BeginCpu("composite");
   const bool keep_transmittance = Shows(request, ImageKind::kLightTransmittance);
   const std::vector<TileLight> tile_lights = ListTileLights(scene, keep_transmittance);
   Composite composite = MakeComposite(plan.composite_size, plan.keep_depth,
-                                      keep_transmittance ? tile_lights.size() : 0);
+                                      keep_transmittance ? tile_lights.size() : 0, context.stop);
+  if (context.stop.stop_requested()) return absl::CancelledError("frame cancelled");
+
+  // Run by run, shade them and draw them behind those that are nearer.
   for (const TileRun& run : CutIntoRuns((*list)->rects, kImageTile, {})) {
     clock.BeginCpu("project");
     const auto tiles = TilesOf(context, list_key, **list, run);

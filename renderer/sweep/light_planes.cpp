@@ -6,6 +6,7 @@
 
 #include "renderer/blur_kernel.h"
 #include "renderer/parallel.h"
+#include "renderer/pixel_memory.h"
 #include "renderer/sweep/kernels.h"
 
 namespace halflight::sweep {
@@ -95,7 +96,7 @@ Image LightPlanes::ToImage() const {
   Image image = EmptyImage(*this);
   const size_t channels = depth.size();
   const auto width = static_cast<size_t>(size);
-  image.pixels.resize(width * width * channels);
+  image.pixels = Zeros(width * width * channels);
   ParallelRanges(width * width, [&](const WorkRange& range) {
     for (size_t i = range.begin; i < range.end; ++i) {
       const size_t at = i / width * static_cast<size_t>(pitch) + i % width;

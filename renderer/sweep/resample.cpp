@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "renderer/parallel.h"
+#include "renderer/pixel_memory.h"
 
 namespace halflight::sweep {
 
@@ -48,7 +49,7 @@ Image Resample(Image samples, const Sampling& sampling, const glm::ivec2& size) 
   if (sampling.supersample == 1 && sampling.downsample == 1) return samples;
   Image image{size.x, size.y, 1, samples.channels, {}};
   const auto width = static_cast<size_t>(size.x);
-  image.pixels.resize(width * size.y * 4, 0.0F);
+  image.pixels = Zeros(width * size.y * 4);
   ParallelRanges(width * size.y, [&](const WorkRange& range) {
     for (size_t i = range.begin; i < range.end; ++i) {
       const auto x = static_cast<int>(i % width);
