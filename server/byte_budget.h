@@ -49,6 +49,7 @@ class ByteBudget {
     uint64_t taken_ = 0;
   };
 
+  [[nodiscard]] uint64_t total() const { return total_; }
   [[nodiscard]] uint64_t left() const { return left_; }
   [[nodiscard]] uint64_t used() const { return total_ - left_; }
 

@@ -51,16 +51,15 @@ CallToken::CallToken(Rpc rpc, CallCount& count, const Backend& backend, const Ac
   context.AddInitialMetadata(kRequestIdKey, caller_.call_id);
   ++count_.begun;
   ++count_.active_of[static_cast<size_t>(rpc)];
-  if (const int active = ++count_.active; active > static_cast<int64_t>(backend.limits.max_calls)) {
-    refusal_ = BusyError(v1::ERROR_REASON_TOO_MANY_CALLS,
-                         fmt::format("{} calls are under way, allowed: at most {}: retry later",
-                                     active - 1, backend.limits.max_calls));
+  const int active = ++count_.active;
+  if (count_.draining) {
+    refusal_ = DrainingError();
     return;
   }
-  if (count_.draining) {
-    refusal_ =
-        WithReason(absl::UnavailableError("the server is shutting down: retry elsewhere or later"),
-                   v1::ERROR_REASON_DRAINING);
+  if (active > static_cast<int64_t>(backend.limits.max_calls)) {
+    refusal_ = BusyError(v1::ERROR_REASON_TOO_MANY_CALLS,
+                         fmt::format("{} calls are under way", active - 1),
+                         fmt::format("at most {}", backend.limits.max_calls));
     return;
   }
   auto tenant = access.TenantOf(context);

@@ -2,6 +2,7 @@
 
 #include "absl/strings/cord.h"
 #include "absl/strings/numbers.h"
+#include "absl/strings/str_cat.h"
 #include "renderer/field_error.h"
 #include "server/status_text.h"
 
@@ -52,8 +53,18 @@ absl::Status LimitError(const std::string& field, const std::string& value,
   return WithReason(FieldError(field, value, allowed), v1::ERROR_REASON_LIMIT_EXCEEDED);
 }
 
-absl::Status BusyError(v1::ErrorReason reason, const std::string& message) {
-  return WithRetryHint(WithReason(absl::ResourceExhaustedError(message), reason));
+absl::Status BusyError(v1::ErrorReason reason, const std::string& value,
+                       const std::string& allowed) {
+  absl::Status status =
+      absl::ResourceExhaustedError(absl::StrCat(value, ", allowed: ", allowed, ": retry later"));
+  status.SetPayload(kValuePayload, absl::Cord(value));
+  status.SetPayload(kAllowedPayload, absl::Cord(allowed));
+  return WithRetryHint(WithReason(std::move(status), reason));
+}
+
+absl::Status DrainingError() {
+  return WithReason(absl::UnavailableError("the server is shutting down: retry elsewhere or later"),
+                    v1::ERROR_REASON_DRAINING);
 }
 
 absl::Status WithRetryHint(absl::Status status) {

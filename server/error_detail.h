@@ -31,8 +31,13 @@ absl::Status WithReason(absl::Status status, v1::ErrorReason reason);
 absl::Status LimitError(const std::string& field, const std::string& value,
                         const std::string& allowed);
 
-// ResourceExhausted, passing: the same request may be accepted after some time.
-absl::Status BusyError(v1::ErrorReason reason, const std::string& message);
+// ResourceExhausted, passing: the same request may be accepted after some time. `value`: what was
+// asked for or is there, `allowed`: the limit, both in words.
+absl::Status BusyError(v1::ErrorReason reason, const std::string& value,
+                       const std::string& allowed);
+
+// Unavailable: the server is shutting down.
+absl::Status DrainingError();
 
 // Marks an error that somebody else made as passing.
 absl::Status WithRetryHint(absl::Status status);

@@ -10,9 +10,10 @@
 
 namespace halflight {
 
-PartialUploads::Entries::iterator PartialUploads::Find(const std::string& sha256) {
-  return std::find_if(kept_.begin(), kept_.end(), [&sha256](const Entry& entry) {
-    return entry.upload->header.sha256() == sha256;
+PartialUploads::Entries::iterator PartialUploads::Find(const std::string& sha256,
+                                                       const std::string& tenant) {
+  return std::find_if(kept_.begin(), kept_.end(), [&](const Entry& entry) {
+    return entry.upload->header.sha256() == sha256 && entry.upload->tenant == tenant;
   });
 }
 
@@ -23,20 +24,20 @@ void PartialUploads::Expire(Entries& dropped) {
   }
 }
 
-uint64_t PartialUploads::CommittedBytes(const std::string& sha256) {
+uint64_t PartialUploads::CommittedBytes(const std::string& sha256, const std::string& tenant) {
   Entries dropped;
   const std::lock_guard lock(mutex_);
   Expire(dropped);
-  const auto found = Find(sha256);
+  const auto found = Find(sha256, tenant);
   return found == kept_.end() ? 0 : found->upload->assembler.received_bytes();
 }
 
 absl::StatusOr<std::unique_ptr<PartialUpload>> PartialUploads::Take(
-    const v1::ParticleSetDescription& header) {
+    const v1::ParticleSetDescription& header, const std::string& tenant) {
   Entries dropped;
   const std::lock_guard lock(mutex_);
   Expire(dropped);
-  const auto found = Find(header.sha256());
+  const auto found = Find(header.sha256(), tenant);
   // A header that lies about the layout gets nothing of an honest one's upload.
   const bool fits = found != kept_.end() && ParticlePrefix(found->upload->header.layout()) ==
                                                 ParticlePrefix(header.layout());
@@ -59,7 +60,7 @@ void PartialUploads::Keep(std::unique_ptr<PartialUpload> upload) {
   Entries dropped;
   const std::lock_guard lock(mutex_);
   Expire(dropped);
-  if (const auto found = Find(upload->header.sha256()); found != kept_.end()) {
+  if (const auto found = Find(upload->header.sha256(), upload->tenant); found != kept_.end()) {
     if (found->upload->assembler.received_bytes() > upload->assembler.received_bytes()) {
       std::swap(found->upload, upload);
     }
@@ -74,8 +75,12 @@ void PartialUploads::Keep(std::unique_ptr<PartialUpload> upload) {
 void PartialUploads::Drop(const std::string& sha256) {
   Entries dropped;
   const std::lock_guard lock(mutex_);
-  if (const auto found = Find(sha256); found != kept_.end()) {
-    dropped.splice(dropped.end(), kept_, found);
+  for (auto entry = kept_.begin(); entry != kept_.end();) {
+    const auto next = std::next(entry);
+    if (entry->upload->header.sha256() == sha256) {
+      dropped.splice(dropped.end(), kept_, entry);
+    }
+    entry = next;
   }
 }
 

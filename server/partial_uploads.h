@@ -1,5 +1,6 @@
-// Uploads that broke off, kept so that they can go on: by name, bounded in number, bytes and age.
-// Knows nothing of streams; who uploads takes one out, and owns it alone until it is put back.
+// Uploads that broke off, kept so that they can go on: by name and tenant, since what another sent
+// under a name may be anything until it is complete; bounded in number, bytes and age. Knows
+// nothing of streams; who uploads takes one out, and owns it alone until it is put back.
 #pragma once
 
 #include <chrono>
@@ -9,6 +10,7 @@
 #include <memory>
 #include <mutex>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "halflight/v1/particles.pb.h"
@@ -20,10 +22,15 @@ namespace halflight {
 // What has arrived of one set, with the memory that it holds.
 struct PartialUpload {
   // The header has been checked.
-  PartialUpload(const v1::ParticleSetDescription& checked, ByteBudget& budget)
-      : header(checked), assembler(header.layout(), header.byte_size()), memory(budget) {}
+  PartialUpload(const v1::ParticleSetDescription& checked, ByteBudget& budget,
+                std::string uploader = "")
+      : header(checked),
+        tenant(std::move(uploader)),
+        assembler(header.layout(), header.byte_size()),
+        memory(budget) {}
 
   v1::ParticleSetDescription header;
+  std::string tenant;  // "" where nothing says who it is
   ParticleAssembler assembler;
   ByteBudget::Share memory;
 };
@@ -45,17 +52,18 @@ class PartialUploads {
 
   [[nodiscard]] ByteBudget& memory() const { return memory_; }
 
-  // Bytes of payload that are kept of the set.
-  [[nodiscard]] uint64_t CommittedBytes(const std::string& sha256);
+  // Bytes of payload that are kept of the tenant's set.
+  [[nodiscard]] uint64_t CommittedBytes(const std::string& sha256, const std::string& tenant = "");
 
-  // Hands out what is kept of the set that the header describes. OutOfRange, and all stays as it
-  // is, where that is less than header.resume_offset.
-  absl::StatusOr<std::unique_ptr<PartialUpload>> Take(const v1::ParticleSetDescription& header);
+  // Hands out what is kept of the tenant's set that the header describes. OutOfRange, and all stays
+  // as it is, where that is less than header.resume_offset.
+  absl::StatusOr<std::unique_ptr<PartialUpload>> Take(const v1::ParticleSetDescription& header,
+                                                      const std::string& tenant = "");
 
-  // Keeps what an upload leaves. Of two of one name the one that got further stays.
+  // Keeps what an upload leaves. Of two of one name and tenant the one that got further stays.
   void Keep(std::unique_ptr<PartialUpload> upload);
 
-  // The set is complete.
+  // The set is complete: nobody's need be kept.
   void Drop(const std::string& sha256);
 
   // Grows a share of memory(), for which uploads that are kept make room, those that broke off
@@ -79,7 +87,7 @@ class PartialUploads {
   // Under the mutex. Uploads hold up to gigabytes, which nobody should wait for to be freed: what
   // is let go is moved to `dropped`, to be freed after the mutex is.
   void Expire(Entries& dropped);
-  Entries::iterator Find(const std::string& sha256);
+  Entries::iterator Find(const std::string& sha256, const std::string& tenant);
 
   ByteBudget& memory_;
   const PartialUploadOptions options_;

@@ -3,9 +3,21 @@
 #include <utility>
 #include <vector>
 
+#include <fmt/format.h>
+
+#include "server/error_detail.h"
 #include "server/particle_files.h"
 
 namespace halflight {
+namespace {
+
+absl::Status FullError(uint64_t bytes, uint64_t max_bytes) {
+  return BusyError(
+      v1::ERROR_REASON_CACHE_FULL, fmt::format("{} bytes more", bytes),
+      fmt::format("{} bytes of particle sets, and those in use leave less", max_bytes));
+}
+
+}  // namespace
 
 uint64_t MemoryBytes(const ParticleSet& set) {
   const auto of = [](const auto& values) { return values.size() * sizeof(*values.data()); };
@@ -53,45 +65,69 @@ bool ParticleStore::OnDiskOnly(const std::string& sha256) {
 }
 
 void ParticleStore::Fetch(const std::string& sha256, std::stop_token stop,
-                          std::function<void()> then) {
+                          std::function<void(const absl::Status&)> then) {
   files_->Read(sha256, std::move(stop), [this, sha256, then = std::move(then)](const auto& set) {
     ++(set != nullptr ? disk_reads_ : failed_disk_reads_);
-    if (set != nullptr) {
-      Keep(sha256, set);
-    }
-    then();
+    then(set != nullptr ? Keep(sha256, set) : absl::OkStatus());
   });
 }
 
-void ParticleStore::Insert(const std::string& sha256, std::shared_ptr<const ParticleSet> set) {
-  if (files_ != nullptr) {
-    files_->Write(sha256, set);
+absl::Status ParticleStore::Insert(const std::string& sha256,
+                                   std::shared_ptr<const ParticleSet> set) {
+  absl::Status kept = Keep(sha256, set);
+  if (kept.ok() && files_ != nullptr) {
+    files_->Write(sha256, std::move(set));
   }
-  Keep(sha256, std::move(set));
+  return kept;
 }
 
-void ParticleStore::Keep(const std::string& sha256, std::shared_ptr<const ParticleSet> set) {
-  const uint64_t bytes = MemoryBytes(*set);
-  if (bytes > max_bytes_) {
-    return;
+std::optional<std::vector<ParticleStore::Entries::const_iterator>> ParticleStore::ToDropFor(
+    uint64_t bytes) const {
+  std::vector<Entries::const_iterator> dropped;
+  uint64_t left = bytes_;
+  const auto fits = [&] {
+    return left + bytes <= max_bytes_ && by_use_.size() - dropped.size() < kMaxSets;
+  };
+  for (auto entry = by_use_.end(); !fits() && entry != by_use_.begin();) {
+    --entry;
+    // Who has no reference by now gets one from here alone.
+    if (entry->set.use_count() == 1) {
+      left -= entry->bytes;
+      dropped.push_back(entry);
+    }
   }
+  return fits() ? std::optional(std::move(dropped)) : std::nullopt;
+}
+
+absl::Status ParticleStore::CheckRoom(uint64_t bytes) const {
+  const std::lock_guard lock(mutex_);
+  return ToDropFor(bytes).has_value() ? absl::OkStatus() : FullError(bytes, max_bytes_);
+}
+
+absl::Status ParticleStore::Keep(const std::string& sha256,
+                                 std::shared_ptr<const ParticleSet> set) {
+  const uint64_t bytes = MemoryBytes(*set);
   // Freed after the lock is: giving back a gigabyte takes longer than anybody should wait.
   std::vector<std::shared_ptr<const ParticleSet>> dropped;
   const std::lock_guard lock(mutex_);
   if (const auto found = by_name_.find(sha256); found != by_name_.end()) {
     by_use_.splice(by_use_.begin(), by_use_, found->second);
-    return;
+    return absl::OkStatus();
   }
-  while (bytes_ + bytes > max_bytes_ || by_use_.size() >= kMaxSets) {
-    Entry& oldest = by_use_.back();
-    bytes_ -= oldest.bytes;
-    by_name_.erase(oldest.sha256);
-    dropped.push_back(std::move(oldest.set));
-    by_use_.pop_back();
+  const auto to_drop = ToDropFor(bytes);
+  if (!to_drop.has_value()) {
+    return FullError(bytes, max_bytes_);
+  }
+  for (const Entries::const_iterator entry : *to_drop) {
+    bytes_ -= entry->bytes;
+    dropped.push_back(entry->set);
+    by_name_.erase(entry->sha256);
+    by_use_.erase(entry);
   }
   by_use_.push_front({sha256, std::move(set), bytes});
   by_name_[sha256] = by_use_.begin();
   bytes_ += bytes;
+  return absl::OkStatus();
 }
 
 ParticleStore::State ParticleStore::state() const {

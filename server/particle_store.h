@@ -1,6 +1,6 @@
 // The particle sets that the server holds, by name, bounded in bytes and number: the least recently
-// used go first. In memory, and where there is a cache directory also there. Knows nothing of how
-// sets arrive or what is in them.
+// used go first, and none that is in use. In memory, and where there is a cache directory also
+// there. Knows nothing of how sets arrive or what is in them.
 #pragma once
 
 #include <atomic>
@@ -9,10 +9,13 @@
 #include <list>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <stop_token>
 #include <string>
 #include <unordered_map>
+#include <vector>
 
+#include "absl/status/status.h"
 #include "renderer/scene.h"
 
 namespace halflight {
@@ -22,7 +25,8 @@ class ParticleFiles;
 // Bytes of memory that the values of a set take.
 uint64_t MemoryBytes(const ParticleSet& set);
 
-// Thread-safe. A set in use outlives its place here: dropping it only drops the store's reference.
+// Thread-safe. A set is in use while somebody holds what Find gave, or it waits to be written to
+// disk: what sets take is bounded, whoever holds them.
 class ParticleStore {
  public:
   // Whatever their size: what a set takes beside its values is not counted.
@@ -49,14 +53,19 @@ class ParticleStore {
   // Whether Find would find the set only after Fetch.
   [[nodiscard]] bool OnDiskOnly(const std::string& sha256);
 
-  // Reads the set from disk into memory, on another thread, which then calls `then`: also where the
-  // file turned out to be damaged or gone, and where `stop` was requested before it was read. Only
-  // where there is a cache directory.
-  void Fetch(const std::string& sha256, std::stop_token stop, std::function<void()> then);
+  // Reads the set from disk into memory, on another thread, which then calls `then`: with OK also
+  // where the file turned out to be damaged or gone, and where `stop` was requested before it was
+  // read; with the error of Insert where it finds no room. Only where there is a cache directory.
+  void Fetch(const std::string& sha256, std::stop_token stop,
+             std::function<void(const absl::Status&)> then);
 
-  // Keeps the set and drops others for it. A set of the same name that is held already stays. A set
-  // larger than the whole store is not kept. On disk it is a little later.
-  void Insert(const std::string& sha256, std::shared_ptr<const ParticleSet> set);
+  // Keeps the set and drops others for it. A set of the same name that is held already stays.
+  // ResourceExhausted, with reason and retry hint, where sets in use leave no room for it. On disk
+  // it is a little later.
+  absl::Status Insert(const std::string& sha256, std::shared_ptr<const ParticleSet> set);
+
+  // What Insert would say of a set of so many bytes.
+  [[nodiscard]] absl::Status CheckRoom(uint64_t bytes) const;
 
   struct State {
     uint64_t bytes = 0;  // in memory
@@ -80,11 +89,14 @@ class ParticleStore {
     std::shared_ptr<const ParticleSet> set;
     uint64_t bytes;
   };
+  using Entries = std::list<Entry>;
 
   bool InMemory(const std::string& sha256) const;
   // Find without counting.
   std::shared_ptr<const ParticleSet> Use(const std::string& sha256);
-  void Keep(const std::string& sha256, std::shared_ptr<const ParticleSet> set);
+  absl::Status Keep(const std::string& sha256, std::shared_ptr<const ParticleSet> set);
+  // Under the mutex: whom to drop for a set of so many bytes; none where that does not do.
+  [[nodiscard]] std::optional<std::vector<Entries::const_iterator>> ToDropFor(uint64_t bytes) const;
 
   const uint64_t max_bytes_;
   mutable std::mutex mutex_;
@@ -93,8 +105,8 @@ class ParticleStore {
   std::atomic<uint64_t> misses_ = 0;
   std::atomic<uint64_t> disk_reads_ = 0;
   std::atomic<uint64_t> failed_disk_reads_ = 0;
-  std::list<Entry> by_use_;  // most recently used first
-  std::unordered_map<std::string, std::list<Entry>::iterator> by_name_;
+  Entries by_use_;  // most recently used first
+  std::unordered_map<std::string, Entries::iterator> by_name_;
   std::unique_ptr<ParticleFiles> files_;  // last: its threads use all of the above
 };
 

@@ -13,8 +13,8 @@
 namespace halflight {
 
 ParticleUpload::ParticleUpload(ParticleStore& store, PartialUploads& partial,
-                               const ServerLimits& limits)
-    : store_(store), partial_(partial), limits_(limits) {}
+                               const ServerLimits& limits, std::string tenant)
+    : store_(store), partial_(partial), limits_(limits), tenant_(std::move(tenant)) {}
 
 ParticleUpload::~ParticleUpload() { Keep(); }
 
@@ -70,11 +70,15 @@ absl::Status ParticleUpload::Begin(const v1::ParticleSetDescription& header) {
     AnswerAlreadyPresent();
     return absl::OkStatus();
   }
+  // Nobody sends gigabytes for a set that finds no room.
+  if (absl::Status room = store_.CheckRoom(*bytes); !room.ok()) {
+    return room;
+  }
   if (header.resume_offset() == 0) {
-    upload_ = std::make_unique<PartialUpload>(header, partial_.memory());
+    upload_ = std::make_unique<PartialUpload>(header, partial_.memory(), tenant_);
     return absl::OkStatus();
   }
-  auto kept = partial_.Take(header);
+  auto kept = partial_.Take(header, tenant_);
   if (!kept.ok()) {
     return kept.status();
   }
@@ -109,7 +113,9 @@ absl::Status ParticleUpload::Append(std::string_view bytes) {
   if (assembler.received_bytes() + bytes.size() <= assembler.payload_bytes() &&
       !partial_.Grow(upload_->memory, bytes.size())) {
     return BusyError(v1::ERROR_REASON_UPLOAD_MEMORY_FULL,
-                     "the memory for uploads in progress is used up: retry later");
+                     fmt::format("{} bytes more", bytes.size()),
+                     fmt::format("{} bytes for all uploads in progress, of which {} are left",
+                                 partial_.memory().total(), partial_.memory().left()));
   }
   return assembler.Append(bytes);
 }
@@ -128,6 +134,9 @@ absl::Status ParticleUpload::Finish(const v1::UploadFinish& finish) {
     return FieldError("finish", fmt::format("after {} bytes", at_),
                       fmt::format("after {} bytes, as in the header", header.byte_size()));
   }
+  if (absl::Status room = store_.CheckRoom(header.byte_size()); !room.ok()) {
+    return room;  // what has arrived is kept
+  }
   NamedParticles particles = upload_->assembler.Finish();
   if (particles.sha256 != header.sha256()) {
     return WithReason(
@@ -136,8 +145,10 @@ absl::Status ParticleUpload::Finish(const v1::UploadFinish& finish) {
         v1::ERROR_REASON_CHECKSUM_MISMATCH);
   }
   partial_.Drop(particles.sha256);
-  store_.Insert(particles.sha256, std::move(particles.set));
   upload_.reset();
+  if (absl::Status kept = store_.Insert(particles.sha256, std::move(particles.set)); !kept.ok()) {
+    return kept;  // others were quicker
+  }
   over_ = true;
   response_.emplace();
   return absl::OkStatus();

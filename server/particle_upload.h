@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <string>
 #include <string_view>
 
 #include "absl/status/status.h"
@@ -22,8 +23,10 @@ namespace halflight {
 // until one of them commits.
 class ParticleUpload {
  public:
-  // What breaks off is kept in `partial`, and goes on from there when the header asks for it.
-  ParticleUpload(ParticleStore& store, PartialUploads& partial, const ServerLimits& limits);
+  // What breaks off is kept in `partial` for `tenant`, and goes on from there when the header asks
+  // for it.
+  ParticleUpload(ParticleStore& store, PartialUploads& partial, const ServerLimits& limits,
+                 std::string tenant = "");
   // As if the stream had ended.
   ~ParticleUpload();
   ParticleUpload(const ParticleUpload&) = delete;
@@ -56,6 +59,7 @@ class ParticleUpload {
   ParticleStore& store_;
   PartialUploads& partial_;
   const ServerLimits& limits_;
+  const std::string tenant_;
   std::unique_ptr<PartialUpload> upload_;  // from the header until the upload is over
   uint64_t at_ = 0;                        // where in the payload the next chunk begins
   bool over_ = false;

@@ -34,7 +34,7 @@ std::string SerializedDetails(const absl::Status& status) {
     rpc::ErrorInfo info;
     info.set_reason(ReasonName(detail.reason));
     info.set_domain("halflight");
-    if (!detail.field.empty()) {
+    if (!detail.value.empty()) {
       (*info.mutable_metadata())["value"] = detail.value;
       (*info.mutable_metadata())["allowed"] = detail.allowed;
     }

@@ -8,7 +8,8 @@
 namespace halflight {
 
 absl::StatusOr<v1::QueryUploadResponse> QueryUpload(const Backend& backend,
-                                                    const v1::QueryUploadRequest& request) {
+                                                    const v1::QueryUploadRequest& request,
+                                                    const Caller& caller) {
   const std::string& sha256 = request.sha256();
   if (sha256.size() != kSha256Bytes) {
     return FieldError("sha256", fmt::format("{} bytes", sha256.size()),
@@ -20,7 +21,7 @@ absl::StatusOr<v1::QueryUploadResponse> QueryUpload(const Backend& backend,
     response.set_complete(true);
   } else {
     backend.metrics.OnSetsAsked(0, 1);
-    response.set_committed_bytes(backend.partial_uploads.CommittedBytes(sha256));
+    response.set_committed_bytes(backend.partial_uploads.CommittedBytes(sha256, caller.tenant));
   }
   return response;
 }

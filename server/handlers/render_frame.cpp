@@ -11,15 +11,20 @@ void RenderFrameHandler::Start(const v1::RenderFrameRequest& request) {
   const std::string& sha256 = request.scene().particle_sha256();
   if (backend_.store.OnDiskOnly(sha256)) {
     backend_.store.Fetch(sha256, stop_.get_token(),
-                         [self = shared_from_this(), request] { self->Begin(request); });
+                         [self = shared_from_this(), request](const absl::Status& fetched) {
+                           self->Begin(request, fetched);
+                         });
   } else {
-    Begin(request);
+    Begin(request, absl::OkStatus());
   }
 }
 
-void RenderFrameHandler::Begin(const v1::RenderFrameRequest& request) {
-  const absl::Status status =
-      stop_.stop_requested() ? absl::CancelledError("the call was cancelled") : Submit(request);
+void RenderFrameHandler::Begin(const v1::RenderFrameRequest& request, absl::Status status) {
+  if (stop_.stop_requested()) {
+    status = absl::CancelledError("the call was cancelled");
+  } else if (status.ok()) {
+    status = Submit(request);
+  }
   if (!status.ok()) {
     backend_.metrics.OnFrameRefused(caller_.tenant, status.code());
     sink_.Finish(status);

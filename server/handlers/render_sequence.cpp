@@ -4,6 +4,8 @@
 #include <utility>
 
 #include <fmt/format.h>
+
+#include "server/error_detail.h"
 #include "server/frame_log.h"
 #include "server/log/log.h"
 #include "server/status_text.h"
@@ -11,25 +13,29 @@
 namespace halflight {
 
 void RenderSequenceHandler::OnRequest(const v1::RenderSequenceRequest& request) {
-  const std::string& sha256 = request.frame().scene().particle_sha256();
+  const std::string& sha256 = state_.SetWanted(request.frame().scene());
   if (backend_.store.OnDiskOnly(sha256)) {
     // Until then the read counts as not done, so that no other begins.
     backend_.store.Fetch(sha256, stop_.get_token(),
-                         [self = shared_from_this(), request] { self->Accept(request); });
+                         [self = shared_from_this(), request](const absl::Status& fetched) {
+                           self->Accept(request, fetched);
+                         });
   } else {
-    Accept(request);
+    Accept(request, absl::OkStatus());
   }
 }
 
-void RenderSequenceHandler::Accept(const v1::RenderSequenceRequest& request) {
+void RenderSequenceHandler::Accept(const v1::RenderSequenceRequest& request,
+                                   const absl::Status& fetched) {
   if (stop_.stop_requested()) {
     return;  // whoever did has ended the call
   }
-  Take(state_.Next(request.frame(), backend_), request.frame().request_id());
+  Take(fetched.ok() ? state_.Next(request.frame(), backend_) : fetched,
+       request.frame().request_id());
 }
 
 void RenderSequenceHandler::OnUnreadableRequest() {
-  Take(absl::InvalidArgumentError("the message is not a RenderSequenceRequest"), "");
+  Take(FieldError("message", "bytes that are none", "a RenderSequenceRequest"), "");
 }
 
 void RenderSequenceHandler::Take(absl::StatusOr<FrameJob> job, const std::string& request_id) {
@@ -38,6 +44,9 @@ void RenderSequenceHandler::Take(absl::StatusOr<FrameJob> job, const std::string
     reading_ = false;
     slots_.push_back(std::make_shared<Slot>());
     slots_.back()->index = next_index_++;
+    if (draining_) {
+      job = DrainingError();
+    }
     if (job.ok()) {
       waiting_ = *std::move(job);
       waiting_->caller = caller_;
@@ -92,6 +101,14 @@ void RenderSequenceHandler::OnEndOfRequests() {
     const std::lock_guard lock(mutex_);
     reading_ = false;
     requests_ended_ = true;
+  }
+  Advance();
+}
+
+void RenderSequenceHandler::OnDrain() {
+  {
+    const std::lock_guard lock(mutex_);
+    draining_ = true;
   }
   Advance();
 }
@@ -193,6 +210,9 @@ RenderSequenceHandler::Step RenderSequenceHandler::NextStep() {
   if (!end_.has_value() && requests_ended_ && slots_.empty() && !reading_) {
     end_ = absl::OkStatus();
   }
+  if (!end_.has_value() && draining_ && slots_.empty()) {
+    end_ = DrainingError();
+  }
   if (end_.has_value()) {
     if (writing_) {
       return Step::kNothing;
@@ -203,7 +223,7 @@ RenderSequenceHandler::Step RenderSequenceHandler::NextStep() {
   if (waiting_.has_value()) {
     return std::exchange(may_submit_, false) ? Step::kSubmit : Step::kNothing;
   }
-  if (!reading_ && !requests_ended_ && slots_.size() < kFramesAhead) {
+  if (!reading_ && !requests_ended_ && !draining_ && slots_.size() < kFramesAhead) {
     reading_ = true;
     return Step::kRead;
   }

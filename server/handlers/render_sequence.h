@@ -46,6 +46,9 @@ class RenderSequenceHandler : public std::enable_shared_from_this<RenderSequence
   // One that is no RenderSequenceRequest: refused as a frame that asks for nonsense is.
   void OnUnreadableRequest();
   void OnEndOfRequests();
+  // The server shuts down: what was accepted goes on, and the stream ends where it stands. Any
+  // thread, any time.
+  void OnDrain();
   // After each write; not ok: the peer is gone.
   void OnWritten(bool ok);
   // The client has cancelled, left, or run out of time. Any thread, any time.
@@ -61,8 +64,8 @@ class RenderSequenceHandler : public std::enable_shared_from_this<RenderSequence
 
   enum class Step : uint8_t { kNothing, kSubmit, kRead, kWrite, kFinish };
 
-  // The particles are in memory, or nowhere.
-  void Accept(const v1::RenderSequenceRequest& request);
+  // The particles are in memory or nowhere, or there is no room for them.
+  void Accept(const v1::RenderSequenceRequest& request, const absl::Status& fetched);
   void Take(absl::StatusOr<FrameJob> job, const std::string& request_id);
   [[nodiscard]] std::string FrameName(const std::string& request_id, uint64_t index) const;
   void Refuse(Slot& slot, const std::string& request_id, const absl::Status& status);
@@ -90,6 +93,7 @@ class RenderSequenceHandler : public std::enable_shared_from_this<RenderSequence
   std::optional<absl::Status> end_;  // what the call ends with
   bool reading_ = false;
   bool requests_ended_ = false;
+  bool draining_ = false;
   bool writing_ = false;
   bool finished_ = false;
   bool advancing_ = false;

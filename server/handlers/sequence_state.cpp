@@ -7,15 +7,25 @@ namespace halflight {
 absl::StatusOr<FrameJob> SequenceState::Next(const v1::RenderFrameRequest& request,
                                              const Backend& backend) {
   const v1::Scene& scene = request.scene();
-  if (scene.particles_case() != v1::Scene::PARTICLES_NOT_SET || !particles_.has_value()) {
-    auto particles = ResolveParticles(scene, backend.store, backend.limits);
-    if (!particles.ok()) {
-      return particles.status();
-    }
-    particles_ = *std::move(particles);
+  v1::Scene& merged = *merged_.mutable_scene();
+  if (scene.has_particle_sha256()) {
+    merged.set_particle_sha256(scene.particle_sha256());
+    inline_.reset();
+  }
+  const bool inherits_inline =
+      inline_.has_value() && scene.particles_case() == v1::Scene::PARTICLES_NOT_SET;
+  const bool brings = scene.has_inline_particles();
+  auto particles = inherits_inline
+                       ? *inline_
+                       : ResolveParticles(brings ? scene : merged, backend.store, backend.limits);
+  if (!particles.ok()) {
+    return particles.status();
+  }
+  if (brings) {
+    merged.clear_particles();
+    inline_ = *particles;
   }
 
-  v1::Scene& merged = *merged_.mutable_scene();
   if (scene.has_time_offset_s()) {
     merged.set_time_offset_s(scene.time_offset_s());
   }
@@ -52,11 +62,16 @@ absl::StatusOr<FrameJob> SequenceState::Next(const v1::RenderFrameRequest& reque
   }
   merged_.set_request_id(request.request_id());
   merged_.set_priority(request.priority());
-  auto job = ConvertFrame(merged_, *particles_, backend.limits, backend.device);
+  auto job = ConvertFrame(merged_, *particles, backend.limits, backend.device);
   if (job.ok() && job->target.has_value()) {
     job->target->knowledge = knowledge_;
   }
   return job;
+}
+
+const std::string& SequenceState::SetWanted(const v1::Scene& scene) const {
+  return scene.particles_case() == v1::Scene::PARTICLES_NOT_SET ? merged_.scene().particle_sha256()
+                                                                : scene.particle_sha256();
 }
 
 }  // namespace halflight

@@ -4,6 +4,7 @@
 
 #include <memory>
 #include <optional>
+#include <string>
 
 #include "absl/status/statusor.h"
 #include "halflight/v1/service.pb.h"
@@ -16,13 +17,17 @@ class SequenceState {
  public:
   // The job of the stream's next request, where each field of the scene that is unset, an unset
   // measure_error or target and empty outputs are those of the request before, and the frames share
-  // what their targets have taught. Errors as for a single frame.
-  // The particles of the last request are kept alive here, even when the store drops them.
+  // what their targets have taught. Errors as for a single frame: NotFound too where a set that is
+  // inherited was dropped by the store meanwhile, which a stream does not keep it from.
   absl::StatusOr<FrameJob> Next(const v1::RenderFrameRequest& request, const Backend& backend);
 
+  // The name of the set in the store that a request with this scene is about; "" where there is
+  // none.
+  [[nodiscard]] const std::string& SetWanted(const v1::Scene& scene) const;
+
  private:
-  v1::RenderFrameRequest merged_;  // without its particles
-  std::optional<NamedParticles> particles_;
+  v1::RenderFrameRequest merged_;         // of particles the name alone, where they are the store's
+  std::optional<NamedParticles> inline_;  // those that a request brought
   std::shared_ptr<TargetKnowledge> knowledge_ = std::make_shared<TargetKnowledge>();
 };
 

@@ -4,8 +4,9 @@
 
 namespace halflight {
 
-UploadParticlesHandler::UploadParticlesHandler(const Backend& backend)
-    : metrics_(backend.metrics), upload_(backend.store, backend.partial_uploads, backend.limits) {}
+UploadParticlesHandler::UploadParticlesHandler(const Backend& backend, const Caller& caller)
+    : metrics_(backend.metrics),
+      upload_(backend.store, backend.partial_uploads, backend.limits, caller.tenant) {}
 
 std::optional<UploadParticlesHandler::Answer> UploadParticlesHandler::OnRequest(
     const v1::UploadParticlesRequest& request) {

@@ -6,6 +6,7 @@
 
 #include "absl/status/statusor.h"
 #include "halflight/v1/particles.pb.h"
+#include "server/caller.h"
 #include "server/handlers/backend.h"
 #include "server/particle_upload.h"
 
@@ -17,7 +18,7 @@ class UploadParticlesHandler {
   using Answer = absl::StatusOr<v1::UploadParticlesResponse>;
 
   // The backend's parts outlive the handler.
-  explicit UploadParticlesHandler(const Backend& backend);
+  explicit UploadParticlesHandler(const Backend& backend, const Caller& caller = {});
 
   // The next message: none to go on reading, or the answer that ends the call.
   std::optional<Answer> OnRequest(const v1::UploadParticlesRequest& request);

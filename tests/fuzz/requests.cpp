@@ -47,7 +47,7 @@ Sets& AllSets() {
         const auto built =
             BuildInlineParticles(testing::MakeParticles(count, attributes), ServerLimits{});
         Require(built.ok(), "the sets to begin with are sets");
-        made->store.Insert(built->sha256, built->set);
+        Require(made->store.Insert(built->sha256, built->set).ok(), "there is room");
         made->names.push_back(built->sha256);
       }
     }

@@ -72,7 +72,7 @@ TEST(PrometheusMetrics, TenantsBeyondTheBoundAreOneSeries) {
 TEST(PrometheusMetrics, ErrorsAreCountedByReason) {
   PrometheusMetrics metrics;
   metrics.OnCall(Rpc::kRenderFrame, absl::OkStatus(), Cancellation::kNone);
-  metrics.OnCall(Rpc::kRenderFrame, BusyError(v1::ERROR_REASON_QUEUE_FULL, "full"),
+  metrics.OnCall(Rpc::kRenderFrame, BusyError(v1::ERROR_REASON_QUEUE_FULL, "9", "8"),
                  Cancellation::kNone);
   metrics.OnCall(Rpc::kUploadParticles, absl::CancelledError("gone"), Cancellation::kStall);
   const MetricsPage page = PageOf(metrics);
@@ -144,7 +144,7 @@ TEST(ServerState, IsReadWhenSomebodyLooks) {
 
   ParticleSet set;
   set.positions.resize(2);
-  store.Insert("a", std::make_shared<const ParticleSet>(std::move(set)));
+  EXPECT_TRUE(store.Insert("a", std::make_shared<const ParticleSet>(std::move(set))).ok());
   engine.SetGate(false);
   const auto stub = v1::RenderService::NewStub(
       grpc::CreateChannel((*server)->addresses()[0], grpc::InsecureChannelCredentials()));

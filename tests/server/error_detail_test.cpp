@@ -60,11 +60,14 @@ TEST(ErrorDetail, TellsAServersLimitFromWhatNoServerTakes) {
 }
 
 TEST(ErrorDetail, WireHasReasonFieldAndRetryAsGoogleRpcWritesThem) {
-  const absl::Status busy = BusyError(v1::ERROR_REASON_QUEUE_FULL, "full");
+  const absl::Status busy = BusyError(v1::ERROR_REASON_QUEUE_FULL, "9 frames", "at most 8");
+  EXPECT_EQ(busy.message(), "9 frames, allowed: at most 8: retry later");
   const auto info = Told<rpc::ErrorInfo>(busy, "ErrorInfo");
   ASSERT_TRUE(info.has_value());
   EXPECT_EQ(info->reason(), "QUEUE_FULL");
   EXPECT_EQ(info->domain(), "halflight");
+  EXPECT_EQ(info->metadata().at("value"), "9 frames");
+  EXPECT_EQ(info->metadata().at("allowed"), "at most 8");
   const auto retry = Told<rpc::RetryInfo>(busy, "RetryInfo");
   ASSERT_TRUE(retry.has_value());
   EXPECT_EQ(milliseconds(retry->retry_delay().seconds() * 1000 +

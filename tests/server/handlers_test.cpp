@@ -193,24 +193,16 @@ TEST_F(Handlers, QueryTellsHowMuchOfAnUploadIsThere) {
 }
 
 TEST_F(Handlers, ServerInfoTellsDeviceLimitsAndWhatIsOffered) {
-  limits_.max_slices = 123;
-  limits_.partial_upload_seconds = 77;
-  limits_.max_partial_uploads = 78;
-  limits_.max_cache_dir_bytes = 79;
   const v1::GetServerInfoResponse info = GetServerInfo(backend_);
   EXPECT_EQ(info.server_version(), "1.2.3");
   EXPECT_EQ(info.gl_renderer(), "fake");
-  EXPECT_EQ(info.limits().max_slices(), 123U);
-  EXPECT_EQ(info.limits().partial_upload_seconds(), 77U);
-  EXPECT_EQ(info.limits().max_partial_uploads(), 78U);
-  EXPECT_EQ(info.limits().max_cache_dir_bytes(), 79U);
   EXPECT_EQ(info.techniques_size(), v1::ShadowTechnique_ARRAYSIZE - 1);
   EXPECT_EQ(info.output_kinds_size(), v1::OutputKind_ARRAYSIZE - 1);
   EXPECT_EQ(info.formats_size(), v1::ImageFormat_ARRAYSIZE - 1);
 }
 
 TEST_F(Handlers, FindMissingKeepsTheOrderAndChecksNames) {
-  store_.Insert(std::string(32, 'b'), std::make_shared<ParticleSet>());
+  EXPECT_TRUE(store_.Insert(std::string(32, 'b'), std::make_shared<ParticleSet>()).ok());
   v1::FindMissingParticlesRequest request;
   for (const char name : {'c', 'b', 'a'}) {
     request.add_sha256(std::string(32, name));
@@ -457,24 +449,66 @@ TEST_F(Sequence, TargetIsKeptUntilSettingsTakeItsPlaceAndTheOtherWayRound) {
   EXPECT_EQ(slices.at(4), 9U);
 }
 
-TEST_F(Sequence, ParticlesOfTheStreamSurviveTheirEviction) {
+// Else whoever leaves streams open would fill the memory for good.
+TEST_F(Sequence, StreamThatWaitsKeepsNoParticlesFromOthers) {
   ParticleStore small(2 * 16);
   Backend backend{engine_.device(), limits_, version_, small, partial_uploads_, pipeline_};
   const auto particles = BuildInlineParticles(MakeRequest().scene().inline_particles(), limits_);
-  small.Insert(particles->sha256, particles->set);
+  ASSERT_TRUE(small.Insert(particles->sha256, std::make_shared<ParticleSet>(*particles->set)).ok());
   handler_ = std::make_shared<RenderSequenceHandler>(backend, sink_);
   v1::RenderFrameRequest first = MakeRequest();
   first.mutable_scene()->set_particle_sha256(particles->sha256);
   handler_->Start();
+  engine_.SetGate(false);
   handler_->OnRequest(Wrap(first));
-  small.Insert(std::string(32, 'x'), std::make_shared<ParticleSet>(*particles->set));
-  ASSERT_FALSE(small.Touch(particles->sha256));
+  const std::string other(32, 'x');
+  EXPECT_EQ(small.Insert(other, particles->set).code(), absl::StatusCode::kResourceExhausted)
+      << "while its frame is drawn there is no room";
+  // The engine of this test remembers its last request.
+  ASSERT_TRUE(engine_.Submit({}, {}, [](const auto&) {}).ok());
+  engine_.SetGate(true);
+  ASSERT_TRUE(WaitFor([&] { return small.Insert(other, particles->set).ok(); }));
   handler_->OnRequest(Same());
   handler_->OnEndOfRequests();
   while (sink_.WaitForWrite()) {
     handler_->OnWritten(true);
   }
-  EXPECT_TRUE(sink_.finished()->ok()) << *sink_.finished();
+  EXPECT_EQ(sink_.finished()->code(), absl::StatusCode::kNotFound) << *sink_.finished();
+  EXPECT_EQ(engine_.rendered(), 2) << "one of them of this test's own";
+}
+
+TEST_F(Sequence, EndsWhereItStandsWhenTheServerDrains) {
+  handler_->Start();
+  engine_.SetGate(false);
+  handler_->OnRequest(Wrap(MakeRequest()));
+  handler_->OnDrain();
+  engine_.SetGate(true);
+  while (sink_.WaitForWrite()) {
+    handler_->OnWritten(true);
+  }
+  EXPECT_EQ(sink_.finished()->code(), absl::StatusCode::kUnavailable);
+  EXPECT_EQ(DetailOf(*sink_.finished()).reason, v1::ERROR_REASON_DRAINING);
+  EXPECT_TRUE(sink_.written().back().has_trailer()) << "what was accepted is sent";
+}
+
+TEST_F(Sequence, RequestsThatComeWhileTheServerDrainsAreRefused) {
+  handler_->Start();
+  engine_.SetGate(false);
+  handler_->OnRequest(Wrap(MakeRequest()));
+  handler_->OnDrain();
+  handler_->OnRequest(Same());
+  engine_.SetGate(true);
+  while (sink_.WaitForWrite()) {
+    handler_->OnWritten(true);
+  }
+  EXPECT_EQ(sink_.finished()->code(), absl::StatusCode::kUnavailable);
+  EXPECT_EQ(engine_.rendered(), 1);
+}
+
+TEST_F(Sequence, DrainEndsOneThatWaitsForItsClient) {
+  handler_->Start();
+  handler_->OnDrain();
+  EXPECT_EQ(sink_.WaitForFinish().code(), absl::StatusCode::kUnavailable);
 }
 
 TEST_F(Sequence, ParticlesOnDiskAreReadBeforeTheirFrames) {
@@ -523,7 +557,8 @@ TEST_F(Sequence, UnreadableRequestEndsTheStreamAfterTheFramesBeforeIt) {
     handler_->OnWritten(true);
   }
   EXPECT_EQ(sink_.finished()->code(), absl::StatusCode::kInvalidArgument);
-  EXPECT_THAT(std::string(sink_.finished()->message()), StartsWith("frame 1: the message is not"));
+  EXPECT_THAT(std::string(sink_.finished()->message()),
+              StartsWith("frame 1: message: bytes that are none"));
   ASSERT_FALSE(sink_.written().empty());
   EXPECT_TRUE(sink_.written().back().has_trailer());
 }

@@ -25,9 +25,10 @@ class Partial : public ::testing::Test {
   static std::string NameOf(int particles) { return Describe(SetOf(particles)).sha256(); }
 
   // An upload of the set of so many particles that got so far, and took its memory.
-  std::unique_ptr<PartialUpload> Begun(int particles, uint64_t bytes) {
+  std::unique_ptr<PartialUpload> Begun(int particles, uint64_t bytes,
+                                       const std::string& tenant = "") {
     const v1::InlineParticles set = SetOf(particles);
-    auto upload = std::make_unique<PartialUpload>(Describe(set), memory_);
+    auto upload = std::make_unique<PartialUpload>(Describe(set), memory_, tenant);
     EXPECT_TRUE(upload->memory.Grow(bytes));
     EXPECT_TRUE(upload->assembler.Append(set.payload().substr(0, bytes)).ok());
     return upload;
@@ -41,6 +42,23 @@ class Partial : public ::testing::Test {
   ByteBudget memory_{10000};
   PartialUploads uploads_{memory_, Options()};
 };
+
+TEST_F(Partial, IsEachTenantsOwn) {
+  uploads_.Keep(Begun(100, 500, "a"));
+  uploads_.Keep(Begun(100, 700, "b"));
+  EXPECT_EQ(uploads_.CommittedBytes(NameOf(100), "a"), 500U);
+  EXPECT_EQ(uploads_.CommittedBytes(NameOf(100), "b"), 700U);
+  EXPECT_EQ(uploads_.CommittedBytes(NameOf(100)), 0U);
+  v1::ParticleSetDescription header = Describe(SetOf(100));
+  header.set_resume_offset(500);
+  EXPECT_EQ(uploads_.Take(header).status().code(), absl::StatusCode::kOutOfRange);
+  const auto taken = uploads_.Take(header, "a");
+  ASSERT_TRUE(taken.ok()) << taken.status();
+  EXPECT_EQ((*taken)->assembler.received_bytes(), 500U);
+  EXPECT_EQ(uploads_.CommittedBytes(NameOf(100), "b"), 700U);
+  uploads_.Drop(NameOf(100));
+  EXPECT_EQ(uploads_.count(), 0U) << "once it is complete, nobody's is kept";
+}
 
 TEST_F(Partial, MemoryIsGivenBackWhenTheTimeIsUp) {
   uploads_.Keep(Begun(100, 1000));

@@ -384,7 +384,10 @@ class StoreOnDisk : public Files {
   // What Find gives after Fetch.
   static std::shared_ptr<const ParticleSet> Fetch(ParticleStore& store, const std::string& sha256) {
     std::promise<void> fetched;
-    store.Fetch(sha256, {}, [&fetched] { fetched.set_value(); });
+    store.Fetch(sha256, {}, [&fetched](const absl::Status& status) {
+      EXPECT_TRUE(status.ok()) << status;
+      fetched.set_value();
+    });
     fetched.get_future().wait();
     return store.Find(sha256);
   }
@@ -394,9 +397,9 @@ TEST_F(StoreOnDisk, SetDroppedFromMemoryComesBackFromDisk) {
   ParticleStore store(150 * kBytesEach, Open());
   const NamedParticles one = SetOf(100);
   const NamedParticles two = SetOf(101);
-  store.Insert(one.sha256, one.set);
+  EXPECT_TRUE(store.Insert(one.sha256, SetOf(100).set).ok());
   EXPECT_FALSE(store.OnDiskOnly(one.sha256));
-  store.Insert(two.sha256, two.set);
+  ASSERT_TRUE(WaitFor([&] { return store.Insert(two.sha256, SetOf(101).set).ok(); }));
   ASSERT_TRUE(WaitFor([&] { return store.idle(); }));
   EXPECT_EQ(store.Find(one.sha256), nullptr);
   EXPECT_TRUE(store.Touch(one.sha256));
@@ -406,12 +409,14 @@ TEST_F(StoreOnDisk, SetDroppedFromMemoryComesBackFromDisk) {
   EXPECT_TRUE(store.OnDiskOnly(two.sha256));
 }
 
-TEST_F(StoreOnDisk, SetDroppedBeforeItIsWrittenIsWrittenAllTheSame) {
+TEST_F(StoreOnDisk, SetsThatWaitForTheDiskAreNotDropped) {
   std::vector<NamedParticles> sets;
   ParticleStore store(50 * kBytesEach, Open());
   for (int i = 20; i < 40; ++i) {
     sets.push_back(SetOf(i));
-    store.Insert(sets.back().sha256, sets.back().set);
+    // There is room once others were written.
+    ASSERT_TRUE(WaitFor([&] { return store.Insert(sets.back().sha256, SetOf(i).set).ok(); }));
+    ASSERT_LE(store.bytes(), 50 * kBytesEach);
   }
   ASSERT_TRUE(WaitFor([&] { return store.idle(); }));
   for (const NamedParticles& set : sets) {
@@ -419,16 +424,22 @@ TEST_F(StoreOnDisk, SetDroppedBeforeItIsWrittenIsWrittenAllTheSame) {
   }
 }
 
-TEST_F(StoreOnDisk, SetInUseStaysWholeWhenMemoryAndDiskLetItGo) {
-  limits_.max_cache_dir_bytes = 8192;
+TEST_F(StoreOnDisk, SetInUseKeepsItsRoomFromThoseOnDisk) {
   ParticleStore store(150 * kBytesEach, Open());
   const NamedParticles one = SetOf(100);
-  store.Insert(one.sha256, SetOf(100).set);
-  const auto rendering = store.Find(one.sha256);
-  store.Insert(SetOf(101).sha256, SetOf(101).set);
+  const NamedParticles two = SetOf(101);
+  EXPECT_TRUE(store.Insert(two.sha256, SetOf(101).set).ok());
   ASSERT_TRUE(WaitFor([&] { return store.idle(); }));
-  EXPECT_FALSE(store.Touch(one.sha256));
+  EXPECT_TRUE(store.Insert(one.sha256, SetOf(100).set).ok());
+  auto rendering = store.Find(one.sha256);
+  std::promise<absl::Status> fetched;
+  store.Fetch(two.sha256, {}, [&](const absl::Status& status) { fetched.set_value(status); });
+  EXPECT_EQ(fetched.get_future().get().code(), absl::StatusCode::kResourceExhausted);
+  EXPECT_EQ(store.Find(two.sha256), nullptr);
   ExpectSame(rendering, one);
+  ASSERT_TRUE(WaitFor([&] { return store.idle(); }));
+  rendering.reset();
+  ExpectSame(Fetch(store, two.sha256), two);
 }
 
 TEST_F(StoreOnDisk, UseInMemoryKeepsTheFile) {
@@ -436,11 +447,11 @@ TEST_F(StoreOnDisk, UseInMemoryKeepsTheFile) {
   ParticleStore store(1 << 20, Open());
   const NamedParticles sets[] = {SetOf(1), SetOf(2), SetOf(3)};
   for (int i : {0, 1}) {
-    store.Insert(sets[i].sha256, sets[i].set);
+    EXPECT_TRUE(store.Insert(sets[i].sha256, sets[i].set).ok());
   }
   ASSERT_TRUE(WaitFor([&] { return store.idle(); }));
   EXPECT_NE(store.Find(sets[0].sha256), nullptr);
-  store.Insert(sets[2].sha256, sets[2].set);
+  EXPECT_TRUE(store.Insert(sets[2].sha256, sets[2].set).ok());
   ASSERT_TRUE(WaitFor([&] { return store.idle(); }));
   EXPECT_TRUE(fs::exists(PathOf(sets[0].sha256)));
   EXPECT_FALSE(fs::exists(PathOf(sets[1].sha256)));

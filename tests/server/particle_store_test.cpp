@@ -19,11 +19,11 @@ std::shared_ptr<const ParticleSet> SetOf(size_t particles) {
 
 TEST(ParticleStore, DropsTheLeastRecentlyUsedFirst) {
   ParticleStore store(3 * 120);
-  store.Insert("a", SetOf(10));
-  store.Insert("b", SetOf(10));
-  store.Insert("c", SetOf(10));
+  EXPECT_TRUE(store.Insert("a", SetOf(10)).ok());
+  EXPECT_TRUE(store.Insert("b", SetOf(10)).ok());
+  EXPECT_TRUE(store.Insert("c", SetOf(10)).ok());
   EXPECT_NE(store.Find("a"), nullptr);
-  store.Insert("d", SetOf(10));
+  EXPECT_TRUE(store.Insert("d", SetOf(10)).ok());
   EXPECT_EQ(store.Find("b"), nullptr);
   EXPECT_NE(store.Find("a"), nullptr);
   EXPECT_NE(store.Find("c"), nullptr);
@@ -32,10 +32,10 @@ TEST(ParticleStore, DropsTheLeastRecentlyUsedFirst) {
 
 TEST(ParticleStore, AskingWhetherASetIsThereCountsAsUse) {
   ParticleStore store(2 * 120);
-  store.Insert("a", SetOf(10));
-  store.Insert("b", SetOf(10));
+  EXPECT_TRUE(store.Insert("a", SetOf(10)).ok());
+  EXPECT_TRUE(store.Insert("b", SetOf(10)).ok());
   EXPECT_TRUE(store.Touch("a"));
-  store.Insert("c", SetOf(10));
+  EXPECT_TRUE(store.Insert("c", SetOf(10)).ok());
   EXPECT_TRUE(store.Touch("a"));
   EXPECT_FALSE(store.Touch("b"));
 }
@@ -43,27 +43,39 @@ TEST(ParticleStore, AskingWhetherASetIsThereCountsAsUse) {
 TEST(ParticleStore, NeverHoldsMoreThanItsBytes) {
   ParticleStore store(1000);
   for (size_t particles = 1; particles <= 90; ++particles) {
-    store.Insert(std::to_string(particles), SetOf(particles));
+    EXPECT_EQ(store.Insert(std::to_string(particles), SetOf(particles)).ok(), particles <= 83);
     EXPECT_LE(store.bytes(), 1000U);
   }
   EXPECT_TRUE(store.Touch("83"));   // 996 bytes, the last that fits
   EXPECT_FALSE(store.Touch("84"));  // 1008 bytes
 }
 
-TEST(ParticleStore, SetInUseOutlivesItsPlace) {
-  ParticleStore store(120);
-  store.Insert("a", SetOf(10));
-  const auto used = store.Find("a");
-  store.Insert("b", SetOf(10));
+TEST(ParticleStore, SetsInUseStayAndOthersGoForThem) {
+  ParticleStore store(2 * 120);
+  EXPECT_TRUE(store.Insert("a", SetOf(10)).ok());
+  EXPECT_TRUE(store.Insert("b", SetOf(10)).ok());
+  auto used = store.Find("a");
+  EXPECT_NE(store.Find("b"), nullptr);
+  EXPECT_TRUE(store.Insert("c", SetOf(10)).ok());
+  EXPECT_TRUE(store.Touch("a")) << "though it was used longest ago";
+  EXPECT_FALSE(store.Touch("b"));
+  const auto also_used = store.Find("c");
+  EXPECT_EQ(store.CheckRoom(1).code(), absl::StatusCode::kResourceExhausted);
+  EXPECT_EQ(store.Insert("d", SetOf(1)).code(), absl::StatusCode::kResourceExhausted);
+  EXPECT_FALSE(store.Touch("d"));
+  EXPECT_TRUE(store.Insert("c", SetOf(10)).ok()) << "it is there";
+  used.reset();
+  EXPECT_TRUE(store.CheckRoom(120).ok());
+  EXPECT_TRUE(store.Insert("d", SetOf(10)).ok());
   EXPECT_FALSE(store.Touch("a"));
-  EXPECT_EQ(used->size(), 10U);
+  EXPECT_EQ(store.bytes(), 240U);
 }
 
 TEST(ParticleStore, SecondSetOfTheSameNameCostsNothing) {
   ParticleStore store(1000);
   const auto first = SetOf(10);
-  store.Insert("a", first);
-  store.Insert("a", SetOf(10));
+  EXPECT_TRUE(store.Insert("a", first).ok());
+  EXPECT_TRUE(store.Insert("a", SetOf(10)).ok());
   EXPECT_EQ(store.bytes(), 120U);
   EXPECT_EQ(store.Find("a"), first);
 }
@@ -89,7 +101,8 @@ TEST(ParticleStore, ManyThreadsAtOnceKeepTheBound) {
         if (const auto set = store.Find(name)) {
           EXPECT_EQ(set->size(), 10U);
         } else {
-          store.Insert(name, SetOf(10));
+          // Refused where others hold what would have to go.
+          store.Insert(name, SetOf(10)).IgnoreError();
         }
       }
     });
