@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include "renderer/device_fault.h"
 #include "server/convert/describe.h"
 #include "server/error_detail.h"
 #include "server/frame_log.h"
@@ -29,8 +30,16 @@ absl::Status FromEngine(const absl::Status& status) {
     // There may be memory when other frames have gone.
     return WithRetryHint(WithReason(status, v1::ERROR_REASON_DEVICE_MEMORY_FULL));
   }
-  if (absl::IsUnavailable(status)) {
+  // Fields of what the renderer draws are the scene's; of what it is to show, the request's.
+  const std::string field = DetailOf(status).field;
+  if (!field.empty() && field != "outputs") {
+    return Within("scene.", status);
+  }
+  if (IsDeviceReset(status)) {
     return WithRetryHint(WithReason(status, v1::ERROR_REASON_DEVICE_RESET));
+  }
+  if (absl::IsUnavailable(status)) {
+    return WithReason(status, v1::ERROR_REASON_DRAINING);  // the engine has come to its end
   }
   return status;
 }
@@ -117,25 +126,25 @@ absl::Status FramePipeline::Admit(const FrameJob& job, Flight& flight) {
   flight.account = std::make_shared<Account>(frame_memory_);
   const std::lock_guard lock(mutex_);
   if (queued_ >= options_.max_queued_frames) {
-    return BusyError(v1::ERROR_REASON_QUEUE_FULL,
-                     fmt::format("the queue is full ({} frames): retry later", queued_));
+    return BusyError(v1::ERROR_REASON_QUEUE_FULL, fmt::format("{} frames are under way", queued_),
+                     fmt::format("at most {}", options_.max_queued_frames));
   }
   const auto own = queued_of_.find(job.caller.client());
   if (own != queued_of_.end() && own->second >= options_.max_client_frames) {
     return BusyError(v1::ERROR_REASON_CLIENT_QUEUE_FULL,
-                     fmt::format("{} frames of this client are under way, allowed: at most {}: "
-                                 "retry later",
-                                 own->second, options_.max_client_frames));
+                     fmt::format("{} frames of this client are under way", own->second),
+                     fmt::format("at most {}", options_.max_client_frames));
   }
   if (!flight.account->share.Grow(job.pixel_bytes)) {
     return BusyError(v1::ERROR_REASON_FRAME_MEMORY_FULL,
-                     fmt::format("the frame takes up to {} bytes, and of the {} for all frames {} "
-                                 "are left: retry later",
-                                 job.pixel_bytes, options_.max_frame_bytes, frame_memory_->left()));
+                     fmt::format("the frame takes up to {} bytes", job.pixel_bytes),
+                     fmt::format("{} for all frames, of which {} are left",
+                                 options_.max_frame_bytes, frame_memory_->left()));
   }
   ++queued_;
   ++queued_of_[job.caller.client()];
   ++flights_;
+  ++accepted_;
   return absl::OkStatus();
 }
 
@@ -174,6 +183,16 @@ uint32_t FramePipeline::queued() const {
 }
 
 size_t FramePipeline::waiting() const { return queue_.waiting(); }
+
+bool FramePipeline::idle() const {
+  const std::lock_guard lock(mutex_);
+  return flights_ == 0;
+}
+
+uint64_t FramePipeline::accepted() const {
+  const std::lock_guard lock(mutex_);
+  return accepted_;
+}
 
 uint64_t FramePipeline::memory_bytes() const { return frame_memory_->used(); }
 
@@ -253,13 +272,12 @@ void FramePipeline::OnBegun(const FlightPtr& flight) {
 
 void FramePipeline::OnRendered(const FlightPtr& flight, FrameResult result) {
   flight->frame.rendered = std::move(result);
-  if (!flight->measure.has_value()) {
-    OnMade(flight);
-  } else if (flight->measure->without_scattering) {
+  // With a target also of a pass that is not measured: a map may be wanted of it yet.
+  if (flight->job.measure.has_value() && flight->job.measure->without_scattering) {
     flight->compared_submitted = Clock::now();
     Render(flight, WithoutScattering(flight->job.request), &FramePipeline::OnRenderedToCompare);
   } else {
-    measurer_.Post([this, flight] { Measure(flight); });
+    OnCompared(flight);
   }
 }
 
@@ -267,7 +285,15 @@ void FramePipeline::OnRenderedToCompare(const FlightPtr& flight, FrameResult res
   flight->frame.comparison_ms =
       Milliseconds(Clock::now() - flight->compared_submitted) - QueueMilliseconds(result);
   flight->frame.other = std::move(result.images[0]);
-  measurer_.Post([this, flight] { Measure(flight); });
+  OnCompared(flight);
+}
+
+void FramePipeline::OnCompared(const FlightPtr& flight) {
+  if (flight->measure.has_value()) {
+    measurer_.Post([this, flight] { Measure(flight); });
+  } else {
+    OnMade(flight);
+  }
 }
 
 void FramePipeline::Measure(const FlightPtr& flight) {
@@ -324,8 +350,10 @@ void FramePipeline::EncodeOutput(const FlightPtr& flight, size_t index) {
   const OutputJob& output = flight->job.outputs[index];
   absl::StatusOr<EncodedImage> encoded = absl::CancelledError("the call was cancelled");
   if (!flight->stop.stop_requested()) {
+    EncodeSettings settings = output.encoding;
+    settings.stop = flight->stop.get_token();
     encoded = options_.encode(flight->images[output.image], output.shown.kind,
-                              output.shown.quantity, output.encoding,
+                              output.shown.quantity, settings,
                               DescribeImage(flight->job, flight->frame, output, engine_.device(),
                                             options_.server_version));
   }

@@ -91,6 +91,10 @@ class FramePipeline {
   [[nodiscard]] uint32_t queued() const;
   // Frames that wait for the engine. Any thread.
   [[nodiscard]] size_t waiting() const;
+  // Whether no frame is anywhere between Submit and the end of `done`. Any thread.
+  [[nodiscard]] bool idle() const;
+  // Frames that were ever accepted. Any thread.
+  [[nodiscard]] uint64_t accepted() const;
   // What frames hold until they are sent. Any thread.
   [[nodiscard]] uint64_t memory_bytes() const;
 
@@ -110,6 +114,7 @@ class FramePipeline {
   void OnBegun(const FlightPtr& flight);
   void OnRendered(const FlightPtr& flight, FrameResult result);
   void OnRenderedToCompare(const FlightPtr& flight, FrameResult result);
+  void OnCompared(const FlightPtr& flight);
   void Measure(const FlightPtr& flight);
   void OnMade(const FlightPtr& flight);
   void Encode(const FlightPtr& flight);
@@ -130,6 +135,7 @@ class FramePipeline {
   uint32_t queued_ = 0;                                  // counts against the limit
   std::unordered_map<std::string, uint32_t> queued_of_;  // by client; none at 0
   uint32_t flights_ = 0;                                 // until `done` has returned
+  uint64_t accepted_ = 0;
 
   WorkerPool workers_;
   // One: a measurement has all cores to itself, but for what renders and encodes meanwhile. Posts

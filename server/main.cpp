@@ -152,7 +152,7 @@ int Run(const Options& options, std::vector<ListeningSocket> inherited, const si
   }
   NotifyServiceManager("READY=1");
 
-  Supervision supervision(**server, **engine, partial_uploads, store, signals,
+  Supervision supervision(**server, **engine, backend, signals,
                           std::chrono::seconds(options.watchdog_seconds));
   const std::optional<int> signal = supervision.WaitForEnd();
   NotifyServiceManager("STOPPING=1");

@@ -2,11 +2,15 @@
 
 #include <chrono>
 #include <functional>
+#include <memory>
+#include <mutex>
 #include <optional>
 #include <utility>
+#include <vector>
 
 #include "absl/status/status.h"
 #include "halflight/v1/service.grpc.pb.h"
+#include "renderer/field_error.h"
 #include "server/call_token.h"
 #include "server/handlers/find_missing_particles.h"
 #include "server/handlers/get_server_info.h"
@@ -27,6 +31,40 @@ namespace {
 
 using grpc::CallbackServerContext;
 
+// Sequences under way: a drain ends each where it stands, since its client may never say that it
+// wants no more.
+class OpenSequences {
+ public:
+  // Until `handler` is gone.
+  void Add(const std::shared_ptr<RenderSequenceHandler>& handler) {
+    const std::lock_guard lock(mutex_);
+    std::erase_if(open_, [](const auto& other) { return other.expired(); });
+    open_.push_back(handler);
+    if (draining_) {
+      handler->OnDrain();
+    }
+  }
+
+  void Drain() {
+    std::vector<std::weak_ptr<RenderSequenceHandler>> open;
+    {
+      const std::lock_guard lock(mutex_);
+      draining_ = true;
+      open.swap(open_);
+    }
+    for (const auto& handler : open) {
+      if (const auto locked = handler.lock()) {
+        locked->OnDrain();
+      }
+    }
+  }
+
+ private:
+  std::mutex mutex_;
+  std::vector<std::weak_ptr<RenderSequenceHandler>> open_;
+  bool draining_ = false;
+};
+
 // What all calls of a service share.
 struct Shared {
   Shared(const Backend& the_backend, const Access& the_access)
@@ -36,6 +74,7 @@ struct Shared {
   const Access& access;
   CallCount count;
   Timer timer;
+  OpenSequences sequences;
 };
 
 std::chrono::seconds StallLimit(const Backend& backend) {
@@ -52,7 +91,7 @@ class UploadCall final : public grpc::ServerReadReactor<v1::UploadParticlesReque
   UploadCall(Shared& shared, CallbackServerContext& context, v1::UploadParticlesResponse& response)
       : token_(Rpc::kUploadParticles, shared.count, shared.backend, shared.access, context),
         response_(response),
-        handler_(shared.backend),
+        handler_(shared.backend, token_.caller()),
         stall_(shared.timer, StallLimit(shared.backend), EndForStall(token_, shared.backend)) {
     if (!token_.refusal().ok()) {
       Answer(token_.refusal());
@@ -87,7 +126,9 @@ class UploadCall final : public grpc::ServerReadReactor<v1::UploadParticlesReque
     if (answer.ok()) {
       response_ = *answer;
     }
-    Finish(token_.End(answer.status()));
+    const grpc::Status status = token_.End(answer.status());
+    stall_.Begin();  // of a peer that reads nothing: until OnDone the call counts
+    Finish(status);
   }
 
   CallToken token_;
@@ -122,8 +163,7 @@ class RenderFrameCall final : public grpc::ServerWriteReactor<grpc::ByteBuffer>,
     if (!token_.refusal().ok()) {
       RenderFrameCall::Finish(token_.refusal());
     } else if (!request_.has_value()) {
-      RenderFrameCall::Finish(
-          absl::InvalidArgumentError("the message is not a RenderFrameRequest"));
+      RenderFrameCall::Finish(FieldError("message", "bytes that are none", "a RenderFrameRequest"));
     } else {
       handler_->Start(*std::exchange(request_, std::nullopt));
     }
@@ -143,7 +183,11 @@ class RenderFrameCall final : public grpc::ServerWriteReactor<grpc::ByteBuffer>,
     stall_.Begin();
     StartWrite(&response_);
   }
-  void Finish(const absl::Status& status) override { Reactor::Finish(token_.End(status)); }
+  void Finish(const absl::Status& status) override {
+    const grpc::Status told = token_.End(status);
+    stall_.Begin();
+    Reactor::Finish(told);
+  }
 
   std::optional<v1::RenderFrameRequest> request_;  // until the call begins
   CallToken token_;
@@ -164,6 +208,7 @@ class RenderSequenceCall final : public grpc::ServerBidiReactor<grpc::ByteBuffer
     if (!token_.refusal().ok()) {
       RenderSequenceCall::Finish(token_.refusal());
     } else {
+      shared.sequences.Add(handler_);
       handler_->Start();
     }
   }
@@ -195,7 +240,11 @@ class RenderSequenceCall final : public grpc::ServerBidiReactor<grpc::ByteBuffer
     stall_.Begin();
     StartWrite(&response_);
   }
-  void Finish(const absl::Status& status) override { Reactor::Finish(token_.End(status)); }
+  void Finish(const absl::Status& status) override {
+    const grpc::Status told = token_.End(status);
+    stall_.Begin();
+    Reactor::Finish(told);
+  }
 
   CallToken token_;
   StallGuard stall_;
@@ -218,11 +267,16 @@ class RenderService::Calls final : public CallbackService {
 
   CallCount& count() { return shared_.count; }
 
+  void BeginDrain() {
+    shared_.count.draining = true;
+    shared_.sequences.Drain();
+  }
+
   grpc::ServerUnaryReactor* GetServerInfo(CallbackServerContext* context,
                                           const v1::GetServerInfoRequest* request,
                                           v1::GetServerInfoResponse* response) override {
     return AnswerAtOnce(Rpc::kGetServerInfo, *context, *request, *response,
-                        [&]() -> absl::StatusOr<v1::GetServerInfoResponse> {
+                        [&](const Caller& /*caller*/) -> absl::StatusOr<v1::GetServerInfoResponse> {
                           return halflight::GetServerInfo(shared_.backend);
                         });
   }
@@ -231,14 +285,18 @@ class RenderService::Calls final : public CallbackService {
       CallbackServerContext* context, const v1::FindMissingParticlesRequest* request,
       v1::FindMissingParticlesResponse* response) override {
     return AnswerAtOnce(Rpc::kFindMissingParticles, *context, *request, *response,
-                        [&] { return halflight::FindMissingParticles(shared_.backend, *request); });
+                        [&](const Caller& /*caller*/) {
+                          return halflight::FindMissingParticles(shared_.backend, *request);
+                        });
   }
 
   grpc::ServerUnaryReactor* QueryUpload(CallbackServerContext* context,
                                         const v1::QueryUploadRequest* request,
                                         v1::QueryUploadResponse* response) override {
     return AnswerAtOnce(Rpc::kQueryUpload, *context, *request, *response,
-                        [&] { return halflight::QueryUpload(shared_.backend, *request); });
+                        [&](const Caller& caller) {
+                          return halflight::QueryUpload(shared_.backend, *request, caller);
+                        });
   }
 
   grpc::ServerReadReactor<v1::UploadParticlesRequest>* UploadParticles(
@@ -268,7 +326,7 @@ class RenderService::Calls final : public CallbackService {
       token.OnReceived(request.ByteSizeLong());
       absl::Status outcome = token.refusal();
       if (outcome.ok()) {
-        auto answer = handler();
+        auto answer = handler(token.caller());
         outcome = answer.status();
         if (answer.ok()) {
           response = *std::move(answer);
@@ -292,7 +350,7 @@ RenderService::~RenderService() = default;
 
 grpc::Service& RenderService::grpc_service() { return *calls_; }
 
-void RenderService::BeginDrain() { calls_->count().draining = true; }
+void RenderService::BeginDrain() { calls_->BeginDrain(); }
 
 int RenderService::active_calls() const { return calls_->count().active; }
 

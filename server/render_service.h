@@ -28,7 +28,8 @@ class RenderService {
   // What a gRPC server registers.
   grpc::Service& grpc_service();
 
-  // From now on new calls are refused with UNAVAILABLE; those under way go on.
+  // From now on new calls are refused with UNAVAILABLE, and no more is read of sequences; frames
+  // under way go on.
   void BeginDrain();
   // Calls under way.
   [[nodiscard]] int active_calls() const;

@@ -15,7 +15,7 @@ using Clock = std::chrono::steady_clock;
 
 // How often the device is looked at.
 constexpr timespec kLook{.tv_sec = 0, .tv_nsec = 250'000'000};
-// How long no call may come before memory goes back: longer than the pauses of somebody at work,
+// How long no frame may come before memory goes back: longer than the pauses of somebody at work,
 // who would wait for it to be taken again.
 constexpr std::chrono::seconds kIdle(10);
 // How often a drain looks whether it is over.
@@ -36,15 +36,9 @@ std::optional<std::string> DeviceTrouble(const EngineState& state, std::chrono::
   return std::nullopt;
 }
 
-Supervision::Supervision(GrpcServer& server, const FrameEngine& engine,
-                         PartialUploads& partial_uploads, const ParticleStore& store,
+Supervision::Supervision(GrpcServer& server, const FrameEngine& engine, const Backend& backend,
                          const sigset_t& signals, std::chrono::seconds patience)
-    : server_(server),
-      engine_(engine),
-      partial_uploads_(partial_uploads),
-      store_(store),
-      signals_(signals),
-      patience_(patience) {}
+    : server_(server), engine_(engine), backend_(backend), signals_(signals), patience_(patience) {}
 
 std::optional<int> Supervision::WaitForEnd() {
   const auto heartbeat = WatchdogInterval();
@@ -71,20 +65,21 @@ std::optional<int> Supervision::WaitForEnd() {
 }
 
 void Supervision::GiveMemoryBack() {
-  partial_uploads_.DropExpired();
-  const uint64_t begun = server_.calls_begun();
-  if (server_.idle() && begun == calls_seen_ && begun != given_back_) {
+  backend_.partial_uploads.DropExpired();
+  const uint64_t frames = backend_.pipeline.accepted();
+  const uint64_t work = frames + server_.calls_begun();
+  if (backend_.pipeline.idle() && frames == frames_seen_ && work != given_back_) {
     BlockCache::Release();
     GiveBackFreedMemory();
-    given_back_ = begun;
+    given_back_ = work;
   }
-  calls_seen_ = begun;
+  frames_seen_ = frames;
 }
 
 bool Supervision::Drain(std::chrono::milliseconds most) {
   const auto until = Clock::now() + most;
   server_.BeginDrain();
-  while (!server_.idle() || !store_.idle()) {
+  while (!server_.idle() || !backend_.pipeline.idle() || !backend_.store.idle()) {
     if (sigtimedwait(&signals_, nullptr, &kDrainPoll) > 0 || Clock::now() >= until) {
       return false;
     }

@@ -9,8 +9,7 @@
 
 #include "renderer/frame_engine.h"
 #include "server/grpc_server.h"
-#include "server/partial_uploads.h"
-#include "server/particle_store.h"
+#include "server/handlers/backend.h"
 
 namespace halflight {
 
@@ -22,16 +21,16 @@ std::optional<std::string> DeviceTrouble(const EngineState& state, std::chrono::
 class Supervision {
  public:
   // All outlive it; `signals` are blocked. `patience` as above.
-  Supervision(GrpcServer& server, const FrameEngine& engine, PartialUploads& partial_uploads,
-              const ParticleStore& store, const sigset_t& signals, std::chrono::seconds patience);
+  Supervision(GrpcServer& server, const FrameEngine& engine, const Backend& backend,
+              const sigset_t& signals, std::chrono::seconds patience);
 
   // The signal that ends the service; none where the device does, and that is logged. Meanwhile
   // tells the service manager that it is well, and gives memory back: of uploads that nobody
-  // resumes, and whenever calls have stopped coming.
+  // resumes, and whenever frames have stopped coming.
   std::optional<int> WaitForEnd();
 
-  // Turns newcomers away and waits for what is under way. True when nothing is any more, and
-  // nothing waits to be written to disk; false when a second signal or the time came first.
+  // Turns newcomers away and waits for what is under way: calls, frames whose calls have gone, what
+  // waits to be written to disk. False when a second signal or the time came first.
   bool Drain(std::chrono::milliseconds most);
 
  private:
@@ -39,12 +38,11 @@ class Supervision {
 
   GrpcServer& server_;
   const FrameEngine& engine_;
-  PartialUploads& partial_uploads_;
-  const ParticleStore& store_;
+  const Backend& backend_;
   const sigset_t signals_;
   const std::chrono::seconds patience_;
-  uint64_t calls_seen_ = 0;
-  std::optional<uint64_t> given_back_;  // after so many calls
+  uint64_t frames_seen_ = 0;
+  std::optional<uint64_t> given_back_;  // after so much work
 };
 
 }  // namespace halflight

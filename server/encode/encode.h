@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <stop_token>
 #include <string>
 #include <utility>
 #include <vector>
@@ -26,6 +27,7 @@ enum class ExrCompression : uint8_t { kNone, kRle, kZips, kZip, kPiz, kDwaa, kDw
 struct EncodeSettings {
   ImageFormat format;
   ExrCompression compression = ExrCompression::kZip;  // only EXR reads it
+  std::stop_token stop{};                             // when nobody wants the file any more
 };
 
 // What a file says about its pixels. Matrices act on column vectors; camera space is x right, y up,
@@ -55,7 +57,7 @@ using SharedImage = std::shared_ptr<const Image>;
 // The same arguments give the same bytes. `quantity` matters to light buffers only. InvalidArgument
 // where the image is not what its kind says (channels, sizes), or holds what the format cannot:
 // finite values beyond half floats in kExrHalf, more than a million rows in PNG. Internal where
-// the image library fails. Any thread.
+// the image library fails, Cancelled soon after the stop was requested. Any thread.
 //
 // PNG loses, knowingly: what is below 0 or above 1, the sign of errors, and emission where alpha is
 // 0, since colours are stored unassociated.

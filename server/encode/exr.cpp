@@ -93,7 +93,7 @@ absl::StatusOr<EncodedImage> EncodeExr(const EncodeInput& input, SampleType stor
   }
   EncodedImage encoded{};
   std::string bytes;
-  const absl::Status status = WriteToMemory(file, image.pixels.data(), bytes);
+  const absl::Status status = WriteToMemory(file, image.pixels.data(), input.settings.stop, bytes);
   if (!status.ok()) return status;
   encoded.bytes = SharedBytes(std::move(bytes));
   return encoded;

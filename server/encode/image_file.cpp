@@ -113,23 +113,37 @@ OIIO::ImageSpec MakeSpec(const ImageFile& file) {
   return spec;
 }
 
+// Some rows at a time, between which the library asks whether to go on.
+absl::Status WriteRows(const ImageFile& file, const void* pixels, const std::stop_token& stop,
+                       OIIO::ImageOutput& output) {
+  const auto stopped = [](void* token, float /*done*/) {
+    return static_cast<const std::stop_token*>(token)->stop_requested();
+  };
+  std::stop_token token = stop;
+  const bool written = output.write_image(LibraryType(file.given), pixels, OIIO::AutoStride,
+                                          OIIO::AutoStride, OIIO::AutoStride, stopped, &token);
+  if (stop.stop_requested()) return absl::CancelledError("encoding was cancelled");
+  return written ? absl::OkStatus() : LibraryError(file.format, output);
+}
+
 absl::Status WriteOne(const ImageFile& file, const OIIO::ImageSpec& spec, const void* pixels,
-                      std::string& bytes) {
+                      const std::stop_token& stop, std::string& bytes) {
   std::vector<unsigned char> buffer;
   OIIO::Filesystem::IOVecOutput proxy(buffer);
   const std::unique_ptr<OIIO::ImageOutput> output = OIIO::ImageOutput::create(file.format, &proxy);
   if (output == nullptr) return NoWriter(file.format);
   // The name is never opened; it only has to end as the format's files do.
-  if (!output->open(absl::StrCat("memory.", file.format), spec) ||
-      !output->write_image(LibraryType(file.given), pixels) || !output->close()) {
+  if (!output->open(absl::StrCat("memory.", file.format), spec)) {
     return LibraryError(file.format, *output);
   }
+  if (absl::Status written = WriteRows(file, pixels, stop, *output); !written.ok()) return written;
+  if (!output->close()) return LibraryError(file.format, *output);
   bytes.assign(buffer.begin(), buffer.end());
   return absl::OkStatus();
 }
 
 absl::Status WriteParts(const ImageFile& file, std::span<const OIIO::ImageSpec> specs,
-                        const void* pixels, std::string& bytes) {
+                        const void* pixels, const std::stop_token& stop, std::string& bytes) {
   const MemoryFile memory;
   if (!memory.valid()) return absl::ErrnoToStatus(errno, "creating a file in memory");
   const std::unique_ptr<OIIO::ImageOutput> output = OIIO::ImageOutput::create(file.format);
@@ -137,15 +151,16 @@ absl::Status WriteParts(const ImageFile& file, std::span<const OIIO::ImageSpec> 
   if (!output->open(memory.path(), static_cast<int>(specs.size()), specs.data())) {
     return LibraryError(file.format, *output);
   }
-  const OIIO::TypeDesc type = LibraryType(file.given);
   const auto* part_pixels = static_cast<const std::byte*>(pixels);
   for (const OIIO::ImageSpec& spec : specs) {
     const bool first = &spec == specs.data();
     if (!first && !output->open(memory.path(), spec, OIIO::ImageOutput::AppendSubimage)) {
       return LibraryError(file.format, *output);
     }
-    if (!output->write_image(type, part_pixels)) return LibraryError(file.format, *output);
-    part_pixels += spec.image_pixels() * file.channels.size() * type.size();
+    if (absl::Status written = WriteRows(file, part_pixels, stop, *output); !written.ok()) {
+      return written;
+    }
+    part_pixels += spec.image_pixels() * file.channels.size() * LibraryType(file.given).size();
   }
   if (!output->close()) return LibraryError(file.format, *output);
   return memory.Read(bytes);
@@ -153,13 +168,14 @@ absl::Status WriteParts(const ImageFile& file, std::span<const OIIO::ImageSpec> 
 
 }  // namespace
 
-absl::Status WriteToMemory(const ImageFile& file, const void* pixels, std::string& bytes) {
+absl::Status WriteToMemory(const ImageFile& file, const void* pixels, const std::stop_token& stop,
+                           std::string& bytes) {
   std::vector<OIIO::ImageSpec> specs(std::max<size_t>(1, file.parts.size()), MakeSpec(file));
   for (size_t part = 0; part < file.parts.size(); ++part) {
     specs[part].attribute("oiio:subimagename", file.parts[part]);
   }
-  return specs.size() == 1 ? WriteOne(file, specs.front(), pixels, bytes)
-                           : WriteParts(file, specs, pixels, bytes);
+  return specs.size() == 1 ? WriteOne(file, specs.front(), pixels, stop, bytes)
+                           : WriteParts(file, specs, pixels, stop, bytes);
 }
 
 }  // namespace halflight

@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cstdint>
+#include <stop_token>
 #include <string>
 #include <utility>
 #include <variant>
@@ -40,8 +41,9 @@ struct ImageFile {
 };
 
 // `pixels` holds the images one after the other, each width * height * channels values of `given`.
-// Replaces `bytes`. Internal with the library's message on failure, or the system's error where
-// memory for the file cannot be had. Any thread.
-absl::Status WriteToMemory(const ImageFile& file, const void* pixels, std::string& bytes);
+// Replaces `bytes`. Internal with the library's message on failure, the system's error where memory
+// for the file cannot be had, Cancelled soon after `stop` was requested. Any thread.
+absl::Status WriteToMemory(const ImageFile& file, const void* pixels, const std::stop_token& stop,
+                           std::string& bytes);
 
 }  // namespace halflight

@@ -137,7 +137,7 @@ absl::StatusOr<EncodedImage> EncodePng(const EncodeInput& input) {
   const std::vector<Integer> codes =
       beauty ? QuantizeBeauty<Integer>(image.pixels) : QuantizeLinear<Integer>(input, range);
   std::string bytes;
-  const absl::Status status = WriteToMemory(file, codes.data(), bytes);
+  const absl::Status status = WriteToMemory(file, codes.data(), input.settings.stop, bytes);
   if (!status.ok()) return status;
   encoded.bytes = SharedBytes(std::move(bytes));
   return encoded;

@@ -4,6 +4,8 @@
 #include <array>
 #include <chrono>
 #include <cstring>
+#include <memory>
+#include <stop_token>
 #include <thread>
 
 #include <gmock/gmock.h>
@@ -32,6 +34,23 @@ std::string Refusal(const Image& image, ImageKind kind, const ImageMetadata& met
   if (encoded.ok()) return "";
   EXPECT_EQ(encoded.status().code(), absl::StatusCode::kInvalidArgument);
   return std::string{encoded.status().message()};
+}
+
+TEST(EncodeImage, IsCutShortOnceNobodyWantsTheFile) {
+  std::stop_source stop;
+  const auto beauty = std::make_shared<const Image>(MakeBeauty(200, 300));
+  const auto code = [&](ImageFormat format) {
+    return EncodeImage(beauty, ImageKind::kBeauty, LightQuantity::kTransmittance,
+                       {.format = format, .stop = stop.get_token()}, {})
+        .status()
+        .code();
+  };
+  EXPECT_EQ(code(ImageFormat::kPng8), absl::StatusCode::kOk);
+  stop.request_stop();
+  for (const ImageFormat format :
+       {ImageFormat::kPng8, ImageFormat::kPng16, ImageFormat::kExrHalf, ImageFormat::kExrFloat}) {
+    EXPECT_EQ(code(format), absl::StatusCode::kCancelled) << static_cast<int>(format);
+  }
 }
 
 TEST(EncodeImage, GivesTheSameBytesASecondLaterAndOnOtherThreads) {

@@ -54,7 +54,7 @@ absl::StatusOr<std::string> EncodeRgb(const PixelRect& size, const std::vector<R
   file.stored = SampleType::kUint8;
   file.attributes = {{"oiio:ColorSpace", "sRGB"}, {"png:compressionLevel", 9}};
   std::string bytes;
-  const absl::Status status = WriteToMemory(file, pixels.data(), bytes);
+  const absl::Status status = WriteToMemory(file, pixels.data(), {}, bytes);
   if (!status.ok()) return status;
   return bytes;
 }

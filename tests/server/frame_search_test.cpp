@@ -259,6 +259,26 @@ TEST_F(Search, OfScatteringComparesEachFrameWithoutAndWithItsSettings) {
   ExpectOfReturned(header);
 }
 
+TEST_F(Search, OfScatteringForTimeAloneHasAMapAllTheSame) {
+  v1::RenderFrameRequest request = TargetRequest();
+  request.mutable_scene()->mutable_material()->set_scattering_spread(0.5F);
+  request.mutable_target()->clear_max_error();
+  request.mutable_target()->set_max_time_ms(1000.0);
+  request.add_outputs()->set_kind(v1::OUTPUT_KIND_ERROR);
+  std::atomic<int> maps = 0;
+  Start({.encode = EncodePlain,
+         .measure = [&](const Image& beauty, const Scene&, const MeasureJob& job,
+                        const std::stop_token&) -> absl::StatusOr<FrameError> {
+           maps += job.map ? 1 : 0;
+           EXPECT_EQ(beauty.width, 64) << "the frame without scattering is there to be measured";
+           return ErrorOf(0.5 * kGoal, job);
+         }});
+  const v1::FrameHeader header = HeaderOf(request);
+  EXPECT_EQ(maps, 1);
+  EXPECT_EQ(header.outputs_size(), 3);
+  EXPECT_EQ(header.error().compared(), v1::COMPARED_FRAME_WITHOUT_SCATTERING);
+}
+
 TEST_F(Search, SecondFrameOfASequenceNeedsOneAttempt) {
   StartShowing({1.3 * kGoal, 0.5 * kGoal});
   const FrameJob first = MustConvert(TargetRequest());

@@ -347,13 +347,28 @@ TEST_F(Service, UploadWithAMessageThatCannotBeReadIsNeverWellAndCommitsNothing) 
   }
 }
 
+// Inflated it could be anything, and before anybody is asked who they are.
+TEST_F(Service, CompressedMessagesAreRefused) {
+  grpc::ClientContext context;
+  context.set_compression_algorithm(GRPC_COMPRESS_GZIP);
+  v1::FindMissingParticlesRequest request;
+  for (int i = 0; i < 1000; ++i) {
+    request.add_sha256(std::string(32, 'a'));
+  }
+  v1::FindMissingParticlesResponse response;
+  EXPECT_EQ(stub_->FindMissingParticles(&context, request, &response).error_code(),
+            grpc::StatusCode::UNIMPLEMENTED);
+}
+
 TEST_F(Service, MalformedRequestsForFramesAreRefused) {
   const grpc::Status of_frame = Send("RenderFrame", {kMalformed});
   EXPECT_EQ(of_frame.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
-  EXPECT_EQ(of_frame.error_message(), "the message is not a RenderFrameRequest");
+  EXPECT_EQ(of_frame.error_message(),
+            "message: bytes that are none, allowed: a RenderFrameRequest");
   const grpc::Status of_sequence = Send("RenderSequence", {kMalformed});
   EXPECT_EQ(of_sequence.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
-  EXPECT_EQ(of_sequence.error_message(), "frame 0: the message is not a RenderSequenceRequest");
+  EXPECT_EQ(of_sequence.error_message(),
+            "frame 0: message: bytes that are none, allowed: a RenderSequenceRequest");
 }
 
 TEST_F(Service, InvalidRequestNamesTheField) {
