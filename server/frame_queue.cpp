@@ -20,6 +20,8 @@ absl::Status FaultedError(int times) {
       v1::ERROR_REASON_FAULTED_TWICE);
 }
 
+constexpr size_t kMostRemembered = 1024;
+
 // To what the engine has counted from when it was given the frame.
 void AddWait(std::chrono::duration<double, std::milli> wait, std::vector<StageTiming>& timings) {
   if (timings.empty() || timings.front().stage != "queue") {
@@ -185,11 +187,13 @@ void FrameQueue::OnRendered(const std::string& client, Clock::time_point begin) 
   ForgetIdleClients();
 }
 
-// Under the mutex. One that would begin where the others are has nothing to be remembered for.
+// Under the mutex. One that would begin where the others are has nothing to be remembered for; and
+// nobody shall fill the memory by calling itself something else each time.
 void FrameQueue::ForgetIdleClients() {
+  const bool too_many = clients_.size() > kMostRemembered;
   std::erase_if(clients_, [&](const auto& named) {
     const Client& client = named.second;
-    return client.waiting.empty() && client.rendering == 0 && client.used <= served_;
+    return client.waiting.empty() && client.rendering == 0 && (too_many || client.used <= served_);
   });
 }
 

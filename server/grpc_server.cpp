@@ -3,8 +3,11 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <string>
 #include <utility>
 
+#include <google/protobuf/stubs/logging.h>
+#include <grpc/compression.h>
 #include <grpc/grpc.h>
 #include <grpc/support/log.h>
 #include <grpcpp/ext/channelz_service_plugin.h>
@@ -32,6 +35,13 @@ void ForwardLog(gpr_log_func_args* line) {
       {{"message", line->message}});
 }
 
+// Protobuf complains of messages that peers sent, each of which has its error.
+void ForwardProtobufLog(google::protobuf::LogLevel level, const char* /*file*/, int /*line*/,
+                        const std::string& message) {
+  Log(level == google::protobuf::LOGLEVEL_FATAL ? LogLevel::kError : LogLevel::kDebug, "protobuf",
+      {{"message", message}});
+}
+
 // Reflection is served by threads of gRPC's, one a stream: so many at once, and more are refused.
 constexpr int kMaxReflectionThreads = 16;
 
@@ -45,6 +55,10 @@ void SetChannelArguments(grpc::ServerBuilder& builder, const ServerLimits& limit
                              Milliseconds(limits.max_handshake_seconds));
   builder.AddChannelArgument(GRPC_ARG_MAX_CONNECTION_IDLE_MS,
                              Milliseconds(limits.max_idle_seconds));
+  // gRPC inflates without a limit, and before anybody is asked who they are.
+  for (const auto algorithm : {GRPC_COMPRESS_DEFLATE, GRPC_COMPRESS_GZIP}) {
+    builder.SetCompressionAlgorithmSupportStatus(algorithm, false);
+  }
   builder.SetResourceQuota(grpc::ResourceQuota("server").SetMaxThreads(kMaxReflectionThreads));
 }
 
@@ -67,6 +81,7 @@ absl::StatusOr<std::unique_ptr<GrpcServer>> GrpcServer::Start(std::vector<Listen
                                                               const Backend& backend,
                                                               const GrpcServerOptions& options) {
   gpr_set_log_function(ForwardLog);
+  google::protobuf::SetLogHandler(ForwardProtobufLog);
   grpc::EnableDefaultHealthCheckService(true);
   grpc::reflection::InitProtoReflectionServerBuilderPlugin();
   if (options.channelz) {

@@ -40,7 +40,7 @@ class Access {
 
   [[nodiscard]] bool encrypts() const { return tls_ != nullptr; }
   // Whether a call has to say who asks.
-  [[nodiscard]] bool authenticates() const { return tokens_ != nullptr || trusts_certificates_; }
+  [[nodiscard]] bool authenticates() const { return tokens() != nullptr || trusts_certificates_; }
 
   // For one server; this outlives it.
   [[nodiscard]] std::shared_ptr<grpc::ServerCredentials> Credentials() const;

@@ -21,6 +21,8 @@
 #include "tests/process/process.h"
 #include "tests/process/wait_for.h"
 #include "tests/server/fake_engine.h"
+#include "tests/server/made_particles.h"
+#include "tests/server/upload_messages.h"
 
 namespace halflight {
 namespace {
@@ -152,6 +154,35 @@ TEST_F(AccessTest, OneBearerTokenIsAllThatCounts) {
                                                 {"Bearer alice's-tokenx"}}) {
     EXPECT_EQ(code(wrong), grpc::StatusCode::UNAUTHENTICATED) << wrong[0];
   }
+}
+
+TEST_F(AccessTest, WhatBrokeOffOfAnUploadIsItsTenantsAlone) {
+  Serve({.token_file = WriteTokens({"alice", "bob"})});
+  const auto stub = v1::RenderService::NewStub(NewChannel(address_));
+  const v1::InlineParticles particles =
+      testing::MakeParticles(100, {v1::PARTICLE_ATTRIBUTE_POSITION});
+  const v1::ParticleSetDescription header = testing::Describe(particles);
+  {
+    grpc::ClientContext context;
+    context.AddMetadata("authorization", "Bearer alice's-token");
+    v1::UploadParticlesResponse response;
+    const auto upload = stub->UploadParticles(&context, &response);
+    upload->Write(testing::Header(header));
+    upload->Write(testing::Chunk(particles.payload().substr(0, 600)));
+    upload->WritesDone();
+    EXPECT_EQ(upload->Finish().error_code(), grpc::StatusCode::INVALID_ARGUMENT);
+  }
+  const auto committed = [&](const std::string& tenant) {
+    grpc::ClientContext context;
+    context.AddMetadata("authorization", "Bearer " + tenant + "'s-token");
+    v1::QueryUploadRequest request;
+    request.set_sha256(header.sha256());
+    v1::QueryUploadResponse response;
+    EXPECT_TRUE(stub->QueryUpload(&context, request, &response).ok());
+    return response.committed_bytes();
+  };
+  EXPECT_EQ(committed("bob"), 0U);
+  EXPECT_EQ(committed("alice"), 600U);
 }
 
 TEST_F(AccessTest, ErrorsSayWhatIsWantedAndNoToken) {

@@ -168,6 +168,10 @@ TEST(Cli, InfoPrintsEveryLimit) {
                             "max_client_frames 48\n", "max_cache_dir_bytes 0\n"}) {
     EXPECT_THAT(ended.out, HasSubstr(limit));
   }
+  const google::protobuf::Descriptor& all = *v1::ServerLimits::descriptor();
+  for (int i = 0; i < all.field_count(); ++i) {
+    EXPECT_THAT(ended.out, HasSubstr(all.field(i)->name() + " "));
+  }
 }
 
 TEST(Cli, MalformedFileIsToldByPlaceAndNothingIsStarted) {

@@ -79,6 +79,10 @@ TEST_F(JsonLog, EveryLineIsAnObjectAndEveryCallHasItsName) {
   const std::string made = alice.Render({}).request_id;
   EXPECT_THAT(made, MatchesRegex("[0-9a-f]{16}-[0-9]+"));
 
+  v1::RenderFrameRequest garbled = MakeRequest();
+  garbled.set_request_id("\xff");  // no UTF-8: Protobuf says so as well
+  EXPECT_FALSE(alice.Render(garbled, "garbled").status.ok());
+
   const v1::InlineParticles set = testing::MakeParticles(
       1000, {v1::PARTICLE_ATTRIBUTE_POSITION, v1::PARTICLE_ATTRIBUTE_RADIUS});
   const v1::ParticleSetDescription header = Describe(set);
@@ -123,6 +127,7 @@ TEST_F(JsonLog, EveryLineIsAnObjectAndEveryCallHasItsName) {
   EXPECT_EQ(Number(refused, "sent_bytes"), 0.0);
   EXPECT_GE(Number(refused, "total_ms"), 0.0);
   EXPECT_EQ(Text(LineOf(lines, "call", made), "outcome"), "INVALID_ARGUMENT");
+  EXPECT_EQ(Text(LineOf(lines, "call", "garbled"), "outcome"), "INVALID_ARGUMENT");
 
   const Struct stranger = LineOf(lines, "call", "stranger");
   EXPECT_EQ(Text(stranger, "reason"), "UNAUTHENTICATED");

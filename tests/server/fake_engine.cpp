@@ -22,7 +22,6 @@ FakeEngine::~FakeEngine() {
 absl::Status FakeEngine::Submit(FrameRequest request, std::stop_token stop, Done done) {
   const std::lock_guard lock(mutex_);
   if (!refusal_.ok()) {
-    ++refused_;
     return refusal_;
   }
   jobs_.push_back({std::move(request), std::move(stop), std::move(done)});
@@ -59,11 +58,6 @@ int FakeEngine::rendered() const {
 int FakeEngine::waiting() const {
   const std::lock_guard lock(mutex_);
   return static_cast<int>(jobs_.size());
-}
-
-int FakeEngine::refused() const {
-  const std::lock_guard lock(mutex_);
-  return refused_;
 }
 
 FrameRequest FakeEngine::last_request() const {

@@ -42,8 +42,6 @@ class FakeEngine : public FrameEngine {
 
   [[nodiscard]] int rendered() const;
   [[nodiscard]] int waiting() const;
-  // How often Submit has refused.
-  [[nodiscard]] int refused() const;
   [[nodiscard]] FrameRequest last_request() const;
 
  private:
@@ -62,7 +60,6 @@ class FakeEngine : public FrameEngine {
   bool open_ = true;
   bool closing_ = false;
   int rendered_ = 0;
-  int refused_ = 0;
   double milliseconds_ = 0.25;
   absl::Status failure_;
   absl::Status refusal_;

@@ -2,14 +2,20 @@
 
 #include "server/options.h"
 
+#include <algorithm>
+#include <iterator>
+#include <map>
 #include <sstream>
+#include <string>
 #include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "server/handlers/get_server_info.h"
 #include "server/unix_socket.h"
 #include "tests/process/process.h"
+#include "tests/server/fake_engine.h"
 
 namespace halflight {
 namespace {
@@ -65,6 +71,56 @@ TEST(Options, CacheDirectoryHasABoundAndWithoutOneThereIsNone) {
   EXPECT_EQ((*options)->limits.max_partial_uploads, 5U);
 }
 
+// What a server started with these limits tells of them.
+v1::ServerLimits Told(const ServerLimits& limits) {
+  testing::FakeEngine engine;
+  const std::string version = "1";
+  ParticleStore store(1);
+  ByteBudget memory(1);
+  PartialUploads partial_uploads(memory, {});
+  FramePipeline pipeline(engine, {});
+  return GetServerInfo({engine.device(), limits, version, store, partial_uploads, pipeline})
+      .limits();
+}
+
+// Each limit is a flag, a line of the configuration and a field of one name: set to a value of its
+// own, it is told as that.
+TEST(Options, EachLimitIsToldAsItWasSet) {
+  // Of those that are held against others, or that have a range of their own.
+  std::map<std::string, uint64_t> values = {{"max_message_bytes", 200000},
+                                            {"max_cache_bytes", 5000},
+                                            {"max_cache_dir_bytes", 6000},
+                                            {"max_lights", 7}};
+  const google::protobuf::Descriptor& all = *v1::ServerLimits::descriptor();
+  const testing::Folder folder;
+  // Without the directory its bytes are told as 0.
+  std::vector<std::string> words = {"--cache-dir", folder / "cache"};
+  std::string lines = "cache-dir = " + folder / "cache" + "\n";
+  for (int i = 0; i < all.field_count(); ++i) {
+    std::string name = all.field(i)->name();
+    const std::string value = std::to_string(values.try_emplace(name, 70 + i).first->second);
+    std::replace(name.begin(), name.end(), '_', '-');
+    words.insert(words.end(), {"--" + name, value});
+    lines += name + " = " + value + "\n";
+  }
+  std::vector<const char*> flags;
+  std::transform(words.begin(), words.end(), std::back_inserter(flags),
+                 [](const std::string& word) { return word.c_str(); });
+  const std::string path = folder.Write("halflightd.conf", lines);
+  for (const auto& options : {Parse(flags), Parse({"--config", path.c_str()})}) {
+    ASSERT_TRUE(options.ok()) << options.status();
+    const v1::ServerLimits told = Told((*options)->limits);
+    const google::protobuf::Reflection& fields = *told.GetReflection();
+    for (int i = 0; i < all.field_count(); ++i) {
+      const google::protobuf::FieldDescriptor& field = *all.field(i);
+      const bool narrow = field.cpp_type() == google::protobuf::FieldDescriptor::CPPTYPE_UINT32;
+      EXPECT_EQ(narrow ? fields.GetUInt32(told, &field) : fields.GetUInt64(told, &field),
+                values[field.name()])
+          << field.name();
+    }
+  }
+}
+
 TEST(Options, HelpNamesEveryFlagAndRunsNothing) {
   std::ostringstream out;
   const auto options = Parse({"--help"}, &out);
@@ -74,6 +130,11 @@ TEST(Options, HelpNamesEveryFlagAndRunsNothing) {
                            "--device",
                            "--log-level",
                            "--encode-threads",
+                           "--watchdog-seconds",
+                           "--channelz",
+                           "--log-format",
+                           "--insecure-metrics",
+                           "--metrics-address",
                            "--drain-seconds",
                            "--version",
                            "--max-particles",

@@ -134,6 +134,7 @@ TEST_F(Killed, DamagedSetIsSentAgainByTheClientWithoutAWord) {
   bytes[5000] = static_cast<char>(bytes[5000] ^ 1);
   ASSERT_EQ(folder_.Write("cache/" + ToHex(particles.sha256) + ".particles", bytes), file);
   const Process server(folder_, "halflightd_fake", flags);
+  ASSERT_EQ(server.Address(), address);
   auto client = client::Client::Connect(address);
   const auto frame = client->RenderFrame(Request(), &particles);
   ASSERT_TRUE(frame.ok()) << frame.status();
