@@ -85,7 +85,7 @@ Holdings HoldingsOf(const Server& server) {
   return {.descriptors = static_cast<double>(server.Count("fd")),
           .threads = static_cast<double>(server.Count("task")),
           .megabytes = server.Megabytes(),
-          .gl_objects = server.GlObjects()};
+          .gl_objects = server.Metric("halflight_gl_objects")};
 }
 
 }  // namespace
@@ -143,9 +143,9 @@ void RunCancellations(Run& run) {
   run.report.AtMost("descriptors more", after.descriptors - before.descriptors, 0, "");
   // gRPC's own come and go while it is busy; the long form lets it rest.
   run.report.AtMost("threads more", after.threads - before.threads, run.Of(0, 4), "");
-  if (after.gl_objects.has_value() && before.gl_objects.has_value()) {
-    run.report.AtMost("GL objects more", *after.gl_objects - *before.gl_objects, 0, "");
-  }
+  Require(after.gl_objects.has_value() && before.gl_objects.has_value(),
+          "metrics that count GL objects");
+  run.report.AtMost("GL objects more", *after.gl_objects - *before.gl_objects, 0, "");
   run.report.TimeAtMost("memory more", after.megabytes - before.megabytes, 4, " MiB");
   run.report.None("frames that are other bytes afterwards", others);
 }

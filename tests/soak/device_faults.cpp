@@ -50,7 +50,7 @@ void ResetUnderLoad(Run& run, const client::EncodedParticles& particles) {
   for (const v1::RenderFrameRequest& request : requests) {
     before.push_back(MustRender(channel, request));
   }
-  const auto objects_before = server.GlObjects();
+  const auto objects_before = server.Metric("halflight_gl_objects");
 
   std::atomic<int> seen = 0;
   std::atomic<int> drawn = 0;
@@ -82,14 +82,16 @@ void ResetUnderLoad(Run& run, const client::EncodedParticles& particles) {
   for (size_t i = 0; i < requests.size(); ++i) {
     others += MustRender(channel, requests[i]) == before[i] ? 0 : 1;
   }
-  run.report.AtLeast("resets under load, each seen by the one frame that was in flight", seen,
-                     resets, "");
+  const auto told = server.Metric("halflight_device_resets_total");
+  Require(told.has_value(), "metrics that count resets");
+  run.report.AtLeast("resets under load", *told, resets, "");
+  run.report.AtMost("frames that ended with one, more than there were", seen - *told, 0, "");
   run.report.Tell("frames drawn meanwhile", drawn, "");
   run.report.None("frames that ended otherwise", otherwise);
   run.report.None("frames that are other bytes afterwards", others);
-  if (const auto objects = server.GlObjects(); objects.has_value() && objects_before.has_value()) {
-    run.report.AtMost("GL objects more after resets", *objects - *objects_before, 0, "");
-  }
+  const auto objects = server.Metric("halflight_gl_objects");
+  Require(objects.has_value() && objects_before.has_value(), "metrics that count GL objects");
+  run.report.AtMost("GL objects more after resets", *objects - *objects_before, 0, "");
 }
 
 void ResetByTheSameRequest(Run& run, const client::EncodedParticles& particles) {

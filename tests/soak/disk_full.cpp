@@ -82,8 +82,9 @@ void RunDiskFull(Run& run) {
     server.Signal(SIGTERM);
     Require(server.Wait() == 0, "exit code 0: " + server.Err());
     const std::string log = server.Err();
-    for (size_t at = log.find("is in memory only"); at != std::string::npos;
-         at = log.find("is in memory only", at + 1)) {
+    constexpr char kNotWritten[] = " cache_dir_not_written ";
+    for (size_t at = log.find(kNotWritten); at != std::string::npos;
+         at = log.find(kNotWritten, at + 1)) {
       ++refused;
     }
   }

@@ -34,6 +34,7 @@ struct Stretch {
   double seconds = 0.0;
   int frames = 0;
   std::vector<double> refusals_ms;  // anything but a frame
+  size_t otherwise = 0;             // of these not for want of room
   int calls = 0;
 
   [[nodiscard]] double rate() const { return frames / seconds; }
@@ -113,10 +114,12 @@ class Load {
 
   static void Count(const Call& call, Stretch& stretch) {
     ++stretch.calls;
-    if (call.status().ok() && call.whole()) {
+    const grpc::StatusCode code = call.status().error_code();
+    if (code == grpc::StatusCode::OK && call.whole()) {
       ++stretch.frames;
     } else {
       stretch.refusals_ms.push_back(call.milliseconds());
+      stretch.otherwise += code == grpc::StatusCode::RESOURCE_EXHAUSTED ? 0 : 1;
     }
   }
 
@@ -158,6 +161,7 @@ void RunOverload(Run& run) {
   std::vector<double> peaks;
   std::vector<double> refusals;
   std::vector<double> offered;
+  size_t otherwise = 0;
   for (int turn = 0; turn < turns; ++turn) {
     // The peak before and after: what else the machine does changes while one measures.
     const double before = load.Peak(time / 2).rate();
@@ -168,6 +172,7 @@ void RunOverload(Run& run) {
     peaks.push_back(peak);
     ratios.push_back(100.0 * over.rate() / peak);
     offered.push_back(over.calls / over.seconds / peak);
+    otherwise += over.otherwise;
     refusals.insert(refusals.end(), over.refusals_ms.begin(), over.refusals_ms.end());
   }
   Require(!refusals.empty(), "refusals under overload");
@@ -180,6 +185,7 @@ void RunOverload(Run& run) {
                   Digits(*std::min_element(ratios.begin(), ratios.end())) + " to " +
                       Digits(*std::max_element(ratios.begin(), ratios.end())) + " %");
   run.report.Tell("refusals", static_cast<double>(refusals.size()), "");
+  run.report.None("refused for another reason than want of room", otherwise);
   run.report.Tell("refusals answered within, median", measure::Median(refusals), " ms");
   run.report.TimeAtMost("refusals answered within, 99th percentile",
                         measure::Quantile(refusals, 0.99), 50, " ms");

@@ -78,7 +78,7 @@ double Server::Megabytes() const {
   return (resident - shared) * 4096.0 / (1 << 20);
 }
 
-std::optional<double> Server::GlObjects() const {
+std::optional<double> Server::Metric(const std::string& name) const {
   const testing::ClientSocket client;
   if (metrics_address_.empty() || !client.Connect(metrics_address_)) {
     return std::nullopt;
@@ -89,7 +89,7 @@ std::optional<double> Server::GlObjects() const {
   for (ssize_t got = 0; (got = recv(client.fd(), bytes, sizeof(bytes), 0)) > 0;) {
     text.append(bytes, static_cast<size_t>(got));
   }
-  const std::string value = AfterKey(text, "\nhalflight_gl_objects ");
+  const std::string value = AfterKey(text, "\n" + name + " ");
   return value.empty() ? std::nullopt : std::optional(std::stod(value));
 }
 

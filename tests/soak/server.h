@@ -26,8 +26,8 @@ class Server : public testing::Process {
   [[nodiscard]] bool Serves() const;  // health, over a new connection
   // Memory of its own, none of it shared with others, in MiB.
   [[nodiscard]] double Megabytes() const;
-  // Buffers and textures on the device; none where the server does not tell.
-  [[nodiscard]] std::optional<double> GlObjects() const;
+  // A value of its metrics page; none where the server does not tell.
+  [[nodiscard]] std::optional<double> Metric(const std::string& name) const;
   // Waits for what it does when no call comes for a while: memory goes back to the system.
   void Rest() const;
   // Sets a limit of the process that runs, and gives what it was.
