@@ -34,6 +34,7 @@ FrameRenderer::FrameRenderer(std::unique_ptr<gl::EglContext> context,
     : context_(std::move(context)),
       device_(context_->device()),
       cache_(options.max_reuse_bytes),
+      pieces_(device_.software),
       faults_(options.faults) {
   device_.max_texture_size = std::min(device_.max_texture_size, options.max_texture_size);
   const int by_device = device_.software ? 1 : 2;
@@ -121,6 +122,7 @@ absl::Status FrameRenderer::Record(Begun& frame) {
   const DrawContext context{.gpu = gpu_,
                             .device = device(),
                             .cache = cache,
+                            .pieces = pieces_,
                             .request = frame.request,
                             .particles = **particles,
                             .plan = frame.plan,

@@ -17,6 +17,7 @@
 #include "renderer/gl/egl_context.h"
 #include "renderer/gl/staging.h"
 #include "renderer/gpu.h"
+#include "renderer/raster_pieces.h"
 #include "renderer/shadow_technique.h"
 #include "renderer/stage_clock.h"
 
@@ -85,6 +86,7 @@ class FrameRenderer {
   [[nodiscard]] const FrameCache& cache() const { return cache_; }
   // How many programs frames have needed so far.
   [[nodiscard]] size_t programs_built() const { return gpu_.programs.size(); }
+  [[nodiscard]] const RasterPieces& raster_pieces() const { return pieces_; }
 
  private:
   FrameRenderer(std::unique_ptr<gl::EglContext> context, const FrameRendererOptions& options);
@@ -100,6 +102,7 @@ class FrameRenderer {
   Gpu gpu_;
   FrameCache cache_;
   gl::StagingMemory staging_;
+  RasterPieces pieces_;
   size_t frames_in_flight_;
   std::shared_ptr<PlannedFaults> faults_;
   absl::Status reset_;

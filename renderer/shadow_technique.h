@@ -16,6 +16,7 @@
 namespace halflight {
 
 class FrameCache;
+class RasterPieces;
 struct DeviceInfo;
 struct Gpu;
 struct Projection;
@@ -25,6 +26,7 @@ struct DrawContext {
   Gpu& gpu;
   const DeviceInfo& device;
   FrameCache& cache;
+  RasterPieces& pieces;
   const FrameRequest& request;
   const ParticleView& particles;
   const FramePlan& plan;

@@ -71,7 +71,12 @@ absl::Status DrawUnshadowed(const TraversalContext& context) {
                        context.eye.projection, *splats, nullptr, nullptr, context.targets.front());
   if (context.traversal.in_tiles) return DrawUnshadowedInTiles(context, composite);
   context.clock.BeginGpu("light and composite");
-  return CompositeSlice(context.gpu, composite, 0, (*order)->count(), nullptr, context.targets);
+  const uint32_t count = (*order)->count();
+  return context.pieces.Draw(context.pieces.CostsOf(*splats, count, context.eye.projection.size), 0,
+                             count, context.stop, [&](uint32_t begin, uint32_t end) {
+                               return CompositeSlice(context.gpu, composite, begin, end, nullptr,
+                                                     context.targets);
+                             });
 }
 
 // Reads one texture of every band back, resolved where sampling asks for it, into one image; `add`:
@@ -200,6 +205,7 @@ absl::StatusOr<DrawnFrame> HalfAngle::Draw(const DrawContext& context) const {
     const TraversalContext walk{.gpu = context.gpu,
                                 .device = context.device,
                                 .cache = context.cache,
+                                .pieces = context.pieces,
                                 .scene = scene,
                                 .traversal = traversal,
                                 .particles = context.particles,

@@ -43,6 +43,11 @@ absl::Status DrawSlicesByBlending(const TraversalContext& context, const SlicedL
   const auto blur = [&](double from, double to) {
     return sliced.blur(from, to, buffers.before, buffers.scratch);
   };
+  RasterPieces& pieces = context.pieces;
+  const QuadCosts eye_costs =
+      pieces.CostsOf(sliced.composite.eye_splats, order.count(), context.eye.projection.size);
+  const QuadCosts light_costs =
+      pieces.CostsOf(sliced.splats, order.count(), sliced.light.projection.size);
   const size_t slices = order.slice_begin.size() - 1;
   shadow.light_layers = DescribeLightImage(traversal, static_cast<int>(slices));
   for (size_t s = 0; s < slices; ++s) {
@@ -57,23 +62,27 @@ absl::Status DrawSlicesByBlending(const TraversalContext& context, const SlicedL
     }
     LightBuffer& deposit_into = traversal.interpolate ? buffers.after : buffers.before;
     const auto deposit = [&] {
-      return DepositSlice(gpu, sliced.splats, sliced.light, context.scene.material.profile,
-                          sliced.channels, begin, end, deposit_into);
+      return pieces.Draw(light_costs, begin, end, context.stop, [&](uint32_t from, uint32_t to) {
+        return DepositSlice(gpu, sliced.splats, sliced.light, context.scene.material.profile,
+                            sliced.channels, from, to, deposit_into);
+      });
     };
     const auto draw = [&] {
       const SliceLight slice_light{buffers.before, deposit_into};
-      return CompositeSlice(gpu, sliced.composite, begin, end, &slice_light, context.targets);
+      return pieces.Draw(eye_costs, begin, end, context.stop, [&](uint32_t from, uint32_t to) {
+        return CompositeSlice(gpu, sliced.composite, from, to, &slice_light, context.targets);
+      });
     };
     // Plain slicing sees the light without its own slice, interpolation the light on both sides.
     absl::Status status;
     if (traversal.interpolate) {
       CopyLightBuffer(buffers.before, buffers.after);
       status = deposit();
-      status.Update(draw());
+      if (status.ok()) status = draw();
       std::swap(buffers.before, buffers.after);
     } else {
       status = draw();
-      status.Update(deposit());
+      if (status.ok()) status = deposit();
     }
     if (!status.ok()) return status;
     if (traversal.keep_layers) {

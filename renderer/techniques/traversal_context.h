@@ -12,6 +12,7 @@
 #include "renderer/particle_view.h"
 #include "renderer/passes/composite.h"
 #include "renderer/passes/project.h"
+#include "renderer/raster_pieces.h"
 #include "renderer/readback.h"
 #include "renderer/stage_clock.h"
 
@@ -21,6 +22,7 @@ struct TraversalContext {
   Gpu& gpu;
   const DeviceInfo& device;
   FrameCache& cache;
+  RasterPieces& pieces;
   const Scene& scene;
   const Traversal& traversal;
   const ParticleView& particles;
