@@ -16,12 +16,13 @@ namespace {
 constexpr char kFaultPayload[] = "halflight/device-reset";
 constexpr char kSuspect[] = "suspect";
 
-constexpr std::array<std::pair<const char*, DeviceFault>, 5> kKinds = {
+constexpr std::array<std::pair<const char*, DeviceFault>, 6> kKinds = {
     {{"reset", DeviceFault::kReset},
      {"innocent-reset", DeviceFault::kInnocentReset},
      {"gone", DeviceFault::kGone},
      {"out-of-memory", DeviceFault::kOutOfMemory},
-     {"hang", DeviceFault::kHang}}};
+     {"hang", DeviceFault::kHang},
+     {"late", DeviceFault::kLate}}};
 
 }  // namespace
 
@@ -69,7 +70,7 @@ absl::StatusOr<PlannedFaults> PlannedFaults::Parse(const std::string& text) {
       return absl::InvalidArgumentError(
           absl::StrCat("\"", part,
                        "\", allowed: <kind>:<drawing>[-[<last>]] with kind reset, innocent-reset, "
-                       "gone, out-of-memory or hang"));
+                       "gone, out-of-memory, hang or late"));
     }
     faults.planned_.push_back(planned);
   }

@@ -1,6 +1,7 @@
 // Devices that fail: how a renderer says so, and how tests make a sound one do it.
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <limits>
 #include <string>
@@ -21,6 +22,9 @@ bool IsDeviceReset(const absl::Status& status);
 // Whether the frame may have been the cause of a reset.
 bool IsSuspect(const absl::Status& status);
 
+// Longer than it takes to cancel a frame and to ask for another.
+inline constexpr std::chrono::milliseconds kLateness(500);
+
 enum class DeviceFault : uint8_t {
   kNone,
   kReset,          // by what is drawn
@@ -28,6 +32,7 @@ enum class DeviceFault : uint8_t {
   kGone,           // reset, and never to be had again
   kOutOfMemory,
   kHang,  // for ever
+  kLate,  // at it for kLateness, whatever the frame
 };
 
 // Faults of a device that is sound. Drawings are numbered from 1 on, over all renderers that share
@@ -35,7 +40,8 @@ enum class DeviceFault : uint8_t {
 class PlannedFaults {
  public:
   // "reset:2,out-of-memory:4-5": at the second drawing and at the fourth and fifth; "reset:2-" from
-  // the second on. Kinds: reset, innocent-reset, gone, out-of-memory, hang. InvalidArgument.
+  // the second on. Kinds: reset, innocent-reset, gone, out-of-memory, hang, late.
+  // InvalidArgument.
   static absl::StatusOr<PlannedFaults> Parse(const std::string& text);
 
   // What befalls the next drawing.

@@ -42,10 +42,10 @@ class FrameEngine {
 
   // Queues a frame. Its timings begin with "queue", the time until it was begun. When it returns
   // OK, `done` is called exactly once, on the engine's thread, in the order of submission: with the
-  // frame, with an error, or with Cancelled soon after `stop` was requested; with an error of
-  // device_fault.h when the device failed under it, which is then started anew. Otherwise `done` is
-  // never called: ResourceExhausted when the queue is full, Unavailable when the engine is shutting
-  // down or has come to its end. Any thread.
+  // frame, or with an error; with Cancelled soon after `stop` was requested, then before others
+  // where it still waits; with an error of device_fault.h when the device failed under it, which is
+  // then started anew. Otherwise `done` is never called: ResourceExhausted when the queue is full,
+  // Unavailable when the engine is shutting down or has come to its end. Any thread.
   virtual absl::Status Submit(FrameRequest request, std::stop_token stop, Done done) = 0;
 
   // The same at all times. Any thread.

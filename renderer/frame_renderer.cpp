@@ -85,7 +85,7 @@ absl::Status FrameRenderer::CheckReset() {
 }
 
 absl::StatusOr<DrawnFrame> FrameRenderer::Draw(const ShadowTechnique& technique,
-                                               const DrawContext& context) {
+                                               const DrawContext& context, Begun& frame) {
   switch (faults_ == nullptr ? DeviceFault::kNone : faults_->Next()) {
     case DeviceFault::kNone:
       break;
@@ -100,6 +100,9 @@ absl::StatusOr<DrawnFrame> FrameRenderer::Draw(const ShadowTechnique& technique,
       return absl::ResourceExhaustedError("planned: the device is out of memory");
     case DeviceFault::kHang:
       for (;;) std::this_thread::sleep_for(std::chrono::hours(1));
+    case DeviceFault::kLate:
+      frame.late_until = std::chrono::steady_clock::now() + kLateness;
+      break;
   }
   return technique.Draw(context);
 }
@@ -130,7 +133,7 @@ absl::Status FrameRenderer::Record(Begun& frame) {
                             .stop = frame.stop,
                             .staging = frames_in_flight_ > 1 ? &staging_ : nullptr};
   const ShadowTechnique& technique = TechniqueFor(scene.shadow.technique);
-  absl::StatusOr<DrawnFrame> drawn = Draw(technique, context);
+  absl::StatusOr<DrawnFrame> drawn = Draw(technique, context, frame);
   if (absl::IsResourceExhausted(drawn.status()) && (!cache_.empty() || frames_in_flight_ > 1)) {
     // What was kept may be what there is no room beside, or what frames in flight hold: until the
     // device is through with them, and with what they dropped.
@@ -138,7 +141,7 @@ absl::Status FrameRenderer::Record(Begun& frame) {
     staging_.Clear();
     if (frames_in_flight_ > 1) glFinish();
     gl::ForgetErrors();
-    drawn = Draw(technique, context);
+    drawn = Draw(technique, context, frame);
   }
   if (!drawn.ok()) return drawn.status();
   frame.drawn = *std::move(drawn);
@@ -157,6 +160,10 @@ bool FrameRenderer::CanFinish(const Begun& frame, std::chrono::nanoseconds wait)
 }
 
 bool FrameRenderer::IsDrawn(const Begun& frame, std::chrono::nanoseconds wait) {
+  if (std::chrono::steady_clock::now() < frame.late_until) {
+    std::this_thread::sleep_for(wait);
+    return false;
+  }
   return frame.drawn.arriving == nullptr || frame.drawn.arriving->readback.Arrived(wait);
 }
 

@@ -46,6 +46,8 @@ class FrameRenderer {
     FramePlan plan;
     DrawnFrame drawn;
     size_t clamped_opacities = 0;
+    // Until then the device is at it, by plan.
+    std::chrono::steady_clock::time_point late_until;
   };
 
   // Makes a context on the device (see RenderThreadOptions) and on this thread, which must make all
@@ -93,8 +95,9 @@ class FrameRenderer {
 
   // Begins `frame`, of which request and stop are set.
   absl::Status Record(Begun& frame);
-  // Draws, unless a fault is planned.
-  absl::StatusOr<DrawnFrame> Draw(const ShadowTechnique& technique, const DrawContext& context);
+  // Draws `frame`, unless a fault is planned.
+  absl::StatusOr<DrawnFrame> Draw(const ShadowTechnique& technique, const DrawContext& context,
+                                  Begun& frame);
 
   std::unique_ptr<gl::EglContext> context_;
   DeviceInfo device_;

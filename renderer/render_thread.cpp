@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <deque>
 #include <future>
+#include <iterator>
 #include <mutex>
 #include <optional>
 #include <thread>
@@ -13,6 +14,7 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "renderer/device_fault.h"
 #include "renderer/device_restart.h"
 #include "renderer/gl/object.h"
 #include "renderer/stop_times.h"
@@ -63,6 +65,21 @@ class RenderThread : public FrameEngine {
   struct Flights {
     std::deque<Flight> frames;
     std::deque<Flight> cancelled;
+
+    // All that the device is busy with: cancelled ones take their places until it is through with
+    // them, so that no client can have it given work without end.
+    [[nodiscard]] size_t count() const { return frames.size() + cancelled.size(); }
+    [[nodiscard]] bool alone() const {
+      const auto is_alone = [](const Flight& flight) { return flight.alone; };
+      return std::any_of(frames.begin(), frames.end(), is_alone) ||
+             std::any_of(cancelled.begin(), cancelled.end(), is_alone);
+    }
+    // What those in flight are told of `status`. Of a reset any of the cancelled may be the cause
+    // as well, of whom nobody asks any more: then no other is a suspect. One that is the cause will
+    // be found the next time.
+    [[nodiscard]] absl::Status Told(const absl::Status& status) const {
+      return IsDeviceReset(status) && !cancelled.empty() ? DeviceResetError(true) : status;
+    }
   };
 
   void Run(std::promise<absl::Status> started);
@@ -71,7 +88,9 @@ class RenderThread : public FrameEngine {
   // From now on there are no frames.
   void End(const absl::Status& why);
   void WarmUp(FrameRenderer& renderer);
-  // The next job, if it may be begun beside these. Waits for one where none is in flight; none when
+  // Of those that wait; they need not do so until it is their turn.
+  void AnswerStopped();
+  // The next job, if it may be begun beside these. Waits for one where there are none; none when
   // stopping and none is left.
   std::optional<Job> NextJob(const FrameRenderer& renderer, const Flights& flights);
   Flight Begin(FrameRenderer& renderer, Job job);
@@ -147,22 +166,27 @@ EngineState RenderThread::state() const {
 std::optional<RenderThread::Job> RenderThread::NextJob(const FrameRenderer& renderer,
                                                        const Flights& flights) {
   std::unique_lock lock(mutex_);
-  const auto ready = [&] { return stopping_ || !jobs_.empty(); };
-  if (!flights.frames.empty()) {
-    // One that the CPU draws would keep them waiting.
-    if (jobs_.empty() || jobs_.front().request.alone || flights.frames.front().alone ||
-        !renderer.DrawsOnDevice(jobs_.front().request)) {
-      return std::nullopt;
-    }
-  } else if (flights.cancelled.empty()) {
-    changed_.wait(lock, ready);
-  } else {
-    changed_.wait_for(lock, kPatience, ready);
-  }
+  if (flights.count() == 0) changed_.wait(lock, [&] { return stopping_ || !jobs_.empty(); });
   if (jobs_.empty()) return std::nullopt;
+  const FrameRequest& next = jobs_.front().request;
+  if (flights.alone() || (next.alone && flights.count() > 0)) return std::nullopt;
+  // One that the CPU draws would keep them waiting.
+  if (!flights.frames.empty() && !renderer.DrawsOnDevice(next)) return std::nullopt;
   Job job = std::move(jobs_.front());
   jobs_.pop_front();
   return job;
+}
+
+void RenderThread::AnswerStopped() {
+  std::vector<Job> stopped;
+  {
+    const std::lock_guard lock(mutex_);
+    const auto first = std::stable_partition(
+        jobs_.begin(), jobs_.end(), [](const Job& job) { return !job.stop.stop_requested(); });
+    std::move(first, jobs_.end(), std::back_inserter(stopped));
+    jobs_.erase(first, jobs_.end());
+  }
+  for (const Job& job : stopped) Answer(job.done, absl::CancelledError("frame cancelled"));
 }
 
 RenderThread::Flight RenderThread::Begin(FrameRenderer& renderer, Job job) {
@@ -189,15 +213,19 @@ void RenderThread::Finish(FrameRenderer& renderer, Flights& flights) {
   Flight flight = std::move(flights.frames.front());
   flights.frames.pop_front();
   if (!flight.frame.ok()) {
-    Answer(flight.job.done, flight.frame.status());
+    Answer(flight.job.done, flights.Told(flight.frame.status()));
   } else if (flight.job.stop.stop_requested() && !FrameRenderer::IsDrawn(**flight.frame, {})) {
     Answer(flight.job.done, absl::CancelledError("frame cancelled"));
     flights.cancelled.push_back(std::move(flight));
   } else {
     absl::StatusOr<FrameResult> frame = renderer.Finish(*std::move(flight.frame));
     flight.watched.reset();
-    if (frame.ok()) frame->timings.insert(frame->timings.begin(), {"queue", flight.queued_ms});
-    Answer(flight.job.done, std::move(frame));
+    if (frame.ok()) {
+      frame->timings.insert(frame->timings.begin(), {"queue", flight.queued_ms});
+      Answer(flight.job.done, std::move(frame));
+    } else {
+      Answer(flight.job.done, flights.Told(frame.status()));
+    }
   }
 }
 
@@ -206,22 +234,27 @@ void RenderThread::Finish(FrameRenderer& renderer, Flights& flights) {
 absl::Status RenderThread::Serve(FrameRenderer& renderer) {
   Flights flights;
   for (;;) {
+    // A reset ends whatever is drawn: what it ended is still there when it is noticed.
+    const auto look = flights.frames.empty() ? kPatience : std::chrono::milliseconds(0);
+    const auto drawn = std::partition(
+        flights.cancelled.begin(), flights.cancelled.end(),
+        [look](const Flight& flight) { return !FrameRenderer::IsDrawn(**flight.frame, look); });
     if (absl::Status reset = renderer.CheckReset(); !reset.ok()) {
-      for (const Flight& flight : flights.frames) Answer(flight.job.done, reset);
+      for (const Flight& flight : flights.frames) Answer(flight.job.done, flights.Told(reset));
       return reset;
     }
-    std::erase_if(flights.cancelled,
-                  [](const Flight& flight) { return FrameRenderer::IsDrawn(**flight.frame, {}); });
+    flights.cancelled.erase(drawn, flights.cancelled.end());
+    AnswerStopped();
     bool begun = false;
-    if (flights.frames.size() < renderer.frames_in_flight()) {
+    if (flights.count() < renderer.frames_in_flight()) {
       std::optional<Job> job = NextJob(renderer, flights);
       begun = job.has_value();
       if (job) flights.frames.push_back(Begin(renderer, *std::move(job)));
-      if (flights.frames.empty()) {
-        const std::lock_guard lock(mutex_);
-        if (stopping_ && jobs_.empty()) return absl::OkStatus();
-        continue;
-      }
+    }
+    if (flights.frames.empty()) {
+      const std::lock_guard lock(mutex_);
+      if (stopping_ && jobs_.empty()) return absl::OkStatus();
+      continue;
     }
     const Flight& oldest = flights.frames.front();
     const auto wait = begun ? std::chrono::milliseconds(0) : kPatience;

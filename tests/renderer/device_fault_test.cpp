@@ -24,6 +24,7 @@ TEST(PlannedFaults, ComeAtTheirDrawings) {
   EXPECT_THAT(First(5, "hang:4-,out-of-memory:2-3"),
               testing::ElementsAre(kNone, kOutOfMemory, kOutOfMemory, kHang, kHang));
   EXPECT_THAT(First(2, "innocent-reset:1,gone:2"), testing::ElementsAre(kInnocentReset, kGone));
+  EXPECT_THAT(First(2, "late:2"), testing::ElementsAre(kNone, kLate));
 }
 
 TEST(PlannedFaults, AreGoneOnlyFromThenOn) {

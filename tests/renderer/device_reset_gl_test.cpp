@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <chrono>
 #include <deque>
 #include <future>
 #include <memory>
@@ -158,6 +159,68 @@ TEST_F(DeviceReset, WithoutMemoryIsTriedAgainWithoutWhatWasKept) {
     EXPECT_EQ(reused(*after), later);
   }
   EXPECT_EQ(engine_->state().device_resets, 0U);
+}
+
+// A frame that was cancelled, answered so, and is still being drawn.
+class BehindACancelledFrame : public DeviceReset {
+ protected:
+  void Begin(const std::string& faults, int cancelled) {
+    Start(faults, 2);
+    begun_ = std::chrono::steady_clock::now();
+    std::deque<std::future<Frame>> frames;
+    std::stop_source stop;
+    for (int i = 0; i < cancelled; ++i) frames.push_back(Submit(Request(), stop.get_token()));
+    // By then they have been begun: what is stopped before is never drawn.
+    std::this_thread::sleep_for(kLateness / 4);
+    stop.request_stop();
+    for (std::future<Frame>& frame : frames) {
+      EXPECT_TRUE(absl::IsCancelled(frame.get().status()));
+    }
+  }
+  // Whether the device had come to the end of the cancelled ones before that.
+  [[nodiscard]] bool IsBehindThem() const {
+    return std::chrono::steady_clock::now() - begun_ >= kLateness;
+  }
+
+ private:
+  std::chrono::steady_clock::time_point begun_;
+};
+
+// Any of both may have been the cause.
+TEST_F(BehindACancelledFrame, NoOtherIsASuspect) {
+  Begin("late:1,reset:2", 1);
+  const Frame other = Render();
+  EXPECT_TRUE(IsDeviceReset(other.status())) << other.status();
+  EXPECT_FALSE(IsSuspect(other.status()));
+  EXPECT_TRUE(Render().ok());
+}
+
+TEST_F(BehindACancelledFrame, OneThatWantsToBeAloneWaits) {
+  Begin("late:1", 1);
+  FrameRequest alone = Request();
+  alone.alone = true;
+  EXPECT_TRUE(Render(alone).ok());
+  EXPECT_TRUE(IsBehindThem());
+}
+
+TEST_F(BehindACancelledFrame, NoMoreAreBegunThanMayBeInFlight) {
+  Begin("late:1-2", 2);
+  EXPECT_TRUE(Render().ok());
+  EXPECT_TRUE(IsBehindThem());
+}
+
+// While the first is still drawn, which is late.
+TEST_F(DeviceReset, AnswersAStoppedFrameBeforeItsTurn) {
+  Start("late:1");
+  std::stop_source stop;
+  auto first = Submit(Request());
+  auto second = Submit(Request());
+  auto stopped = Submit(Request(), stop.get_token());
+  stop.request_stop();
+  EXPECT_TRUE(absl::IsCancelled(stopped.get().status()));
+  EXPECT_EQ(second.wait_for(std::chrono::seconds(0)), std::future_status::timeout);
+  EXPECT_TRUE(first.get().ok());
+  EXPECT_TRUE(second.get().ok());
 }
 
 // With two in flight cancelled ones are answered at once, and looked after until the device is
