@@ -2,18 +2,14 @@
 // encoding nor sending, and has no bound of its own: whoever pushes limits what is under way.
 #pragma once
 
-#include <chrono>
-#include <condition_variable>
+#include <cstddef>
 #include <functional>
-#include <list>
-#include <map>
 #include <memory>
-#include <mutex>
-#include <optional>
 #include <stop_token>
 #include <string>
 
 #include "renderer/frame_engine.h"
+#include "server/fair_turns.h"
 #include "server/faulted_requests.h"
 
 namespace halflight {
@@ -31,22 +27,17 @@ struct QueuedFrame {
   FrameEngine::Done done{};
 };
 
-// The next frame is that of the client which has had the renderer for the shortest time of late
-// (start-time fair queueing: Goyal, Vin and Cheng 1996, with the time a frame took as its length):
-// of n clients that always wait, each gets an n-th of the renderer, however many frames it sends
-// and however long they are. A client that comes back after a pause has no claim to what it did not
-// use.
+// Whose frame is next, FairTurns says.
 // A frame under which the device was reset twice is refused from then on.
 class FrameQueue {
  public:
-  using Clock = std::chrono::steady_clock;
+  using Clock = FairTurns::Clock;
 
   // Gives the engine, which outlives the queue, `at_once` frames at a time, so that its turn is the
-  // last moment at which a frame is chosen. `now` is called
-  // by several threads.
+  // last moment at which a frame is chosen. `now` is called by several threads.
   FrameQueue(FrameEngine& engine, int at_once, std::function<Clock::time_point()> now = Clock::now);
   // Waits until `done` of all frames was called.
-  ~FrameQueue();
+  ~FrameQueue() = default;
   FrameQueue(const FrameQueue&) = delete;
   FrameQueue& operator=(const FrameQueue&) = delete;
   FrameQueue(FrameQueue&&) = delete;
@@ -59,47 +50,15 @@ class FrameQueue {
   void Push(QueuedFrame frame);
 
   // Frames that wait. Any thread.
-  [[nodiscard]] size_t waiting() const;
+  [[nodiscard]] size_t waiting() const { return turns_.waiting(); }
 
  private:
-  enum class State : uint8_t { kNew, kWaiting, kTaken, kCancelled };
-
-  struct Entry {
-    QueuedFrame frame;
-    State state = State::kNew;
-    Clock::time_point pushed;
-    std::optional<std::stop_callback<std::function<void()>>> on_stop;
-  };
-  using EntryPtr = std::shared_ptr<Entry>;
-
-  struct Client {
-    std::list<EntryPtr> waiting;
-    int rendering = 0;
-    std::chrono::duration<double> used{0.0};  // counted on from where the others were
-  };
-
-  void OnStop(const std::weak_ptr<Entry>& stopped);
-  // Hands frames over as long as the engine takes them.
-  void Advance();
-  // Under the mutex: takes the next frame; null where there is none.
-  EntryPtr TakeNext();
-  void Give(const EntryPtr& entry);
-  absl::Status Submit(const EntryPtr& entry, Clock::time_point begin);
-  void End(const Entry& entry, absl::StatusOr<FrameResult> result);
-  void OnRendered(const std::string& client, Clock::time_point begin);
-  void ForgetIdleClients();
+  void Give(const std::shared_ptr<QueuedFrame>& frame, const FairTurns::Turn& turn);
+  absl::Status Submit(const std::shared_ptr<QueuedFrame>& frame, const FairTurns::Turn& turn);
 
   FrameEngine& engine_;
   FaultedRequests faulted_;
-  const int at_once_;
-  const std::function<Clock::time_point()> now_;
-
-  mutable std::mutex mutex_;
-  std::condition_variable idle_;
-  std::map<std::string, Client> clients_;
-  std::chrono::duration<double> served_{0.0};  // `used` of the client whose turn was last
-  int rendering_ = 0;
-  int unfinished_ = 0;  // pushed, and `done` not yet returned
+  FairTurns turns_;  // last: what it calls uses all of the above
 };
 
 }  // namespace halflight
