@@ -15,6 +15,7 @@
 #include "server/log/log.h"
 #include "server/request_id.h"
 #include "server/status_text.h"
+#include "server/time_limit.h"
 
 namespace halflight {
 namespace {
@@ -43,6 +44,8 @@ absl::Status FromEngine(const absl::Status& status) {
   }
   return status;
 }
+
+absl::Status CallCancelled() { return absl::CancelledError("the call was cancelled"); }
 
 absl::Status TooLongError(std::chrono::milliseconds allowed) {
   return WithReason(absl::DeadlineExceededError(
@@ -81,7 +84,7 @@ struct FramePipeline::Flight {
   std::shared_ptr<Account> account;
 
   std::atomic<bool> rendering_begun = false;
-  std::optional<Timer::Ticket> time_limit;
+  std::optional<TimeLimit> time_limit;
   std::atomic<bool> took_too_long = false;
 
   absl::Status outcome;  // of the stages before, or of the first output that failed, under `mutex`
@@ -159,6 +162,12 @@ absl::Status FramePipeline::Submit(FrameJob job, std::stop_token stop, Done done
   flight->job = std::move(job);
   flight->done = std::move(done);
   flight->submitted = Clock::now();
+  flight->time_limit.emplace(timer_, options_.max_frame_time, [weak = std::weak_ptr(flight)] {
+    if (const FlightPtr late = weak.lock()) {
+      late->took_too_long = true;
+      late->stop.request_stop();
+    }
+  });
   flight->on_client_stop.emplace(std::move(stop), [source = flight->stop] {
     // The callback, and its source, may go with the flight meanwhile.
     // NOLINTNEXTLINE(performance-unnecessary-copy-initialization)
@@ -203,7 +212,7 @@ void FramePipeline::BeginSearch(const FlightPtr& flight) {
 
 void FramePipeline::NextPass(const FlightPtr& flight) {
   if (flight->stop.stop_requested()) {
-    Fail(flight, absl::CancelledError("the call was cancelled"));
+    Fail(flight, CallCancelled());
     return;
   }
   const std::optional<FramePass> pass = flight->search->Next(flight->frame);
@@ -227,12 +236,13 @@ void FramePipeline::NextPass(const FlightPtr& flight) {
     scene.sampling = pass->settings->sampling;
     Render(flight, flight->job.request, &FramePipeline::OnRendered);
   } else {
-    measurer_.Post([this, flight] { Measure(flight); });
+    AwaitMeasurement(flight);
   }
 }
 
 void FramePipeline::Render(const FlightPtr& flight, FrameRequest request, Stage next) {
   const size_t images = request.images.size();
+  flight->time_limit->Pause();
   queue_.Push({.client = flight->job.caller.client(),
                .priority = flight->job.priority,
                .goes_on = flight->rendering_begun,
@@ -255,19 +265,9 @@ void FramePipeline::Render(const FlightPtr& flight, FrameRequest request, Stage 
                    }});
 }
 
-// From the first rendering on the frame's time runs.
 void FramePipeline::OnBegun(const FlightPtr& flight) {
-  if (flight->rendering_begun.exchange(true) ||
-      options_.max_frame_time == std::chrono::milliseconds::max()) {
-    return;
-  }
-  flight->time_limit =
-      timer_.At(Clock::now() + options_.max_frame_time, [weak = std::weak_ptr(flight)] {
-        if (const FlightPtr late = weak.lock()) {
-          late->took_too_long = true;
-          late->stop.request_stop();
-        }
-      });
+  flight->rendering_begun = true;
+  flight->time_limit->Run();
 }
 
 void FramePipeline::OnRendered(const FlightPtr& flight, FrameResult result) {
@@ -290,16 +290,26 @@ void FramePipeline::OnRenderedToCompare(const FlightPtr& flight, FrameResult res
 
 void FramePipeline::OnCompared(const FlightPtr& flight) {
   if (flight->measure.has_value()) {
-    measurer_.Post([this, flight] { Measure(flight); });
+    AwaitMeasurement(flight);
   } else {
     OnMade(flight);
   }
 }
 
+void FramePipeline::AwaitMeasurement(const FlightPtr& flight) {
+  flight->time_limit->Pause();
+  measurer_.Post({.client = flight->job.caller.client(),
+                  .priority = flight->job.priority,
+                  .stop = flight->stop.get_token(),
+                  .run = [this, flight] { Measure(flight); },
+                  .cancelled = [this, flight] { Fail(flight, CallCancelled()); }});
+}
+
 void FramePipeline::Measure(const FlightPtr& flight) {
+  flight->time_limit->Run();
   MadeFrame& frame = flight->frame;
   const MeasureJob& job = *flight->measure;
-  absl::StatusOr<FrameError> error = absl::CancelledError("the call was cancelled");
+  absl::StatusOr<FrameError> error = CallCancelled();
   if (!flight->stop.stop_requested()) {
     const Image& beauty = job.without_scattering ? *frame.other : frame.rendered.images[job.beauty];
     error = options_.measure(beauty, flight->job.request.scene, job, flight->stop.get_token());
@@ -348,7 +358,7 @@ void FramePipeline::Encode(const FlightPtr& flight) {
 
 void FramePipeline::EncodeOutput(const FlightPtr& flight, size_t index) {
   const OutputJob& output = flight->job.outputs[index];
-  absl::StatusOr<EncodedImage> encoded = absl::CancelledError("the call was cancelled");
+  absl::StatusOr<EncodedImage> encoded = CallCancelled();
   if (!flight->stop.stop_requested()) {
     EncodeSettings settings = output.encoding;
     settings.stop = flight->stop.get_token();
@@ -373,9 +383,7 @@ void FramePipeline::EncodeOutput(const FlightPtr& flight, size_t index) {
 void FramePipeline::Complete(const FlightPtr& flight) {
   flight->search.reset();  // others may wait for it
   flight->on_client_stop.reset();
-  if (flight->time_limit.has_value()) {
-    timer_.Cancel(*flight->time_limit);
-  }
+  flight->time_limit->Pause();
   if (flight->took_too_long && absl::IsCancelled(flight->outcome)) {
     flight->outcome = TooLongError(options_.max_frame_time);
   }

@@ -23,6 +23,7 @@
 #include "server/byte_budget.h"
 #include "server/convert/convert_frame.h"
 #include "server/encode/encode.h"
+#include "server/fair_worker.h"
 #include "server/frame_measurement.h"
 #include "server/frame_queue.h"
 #include "server/frame_search.h"
@@ -46,7 +47,8 @@ struct PipelineOptions {
   uint32_t max_client_frames = 64;  // of these, of one client
   // Of pixels, and once a frame is encoded of its files, until the frame is sent.
   uint64_t max_frame_bytes = std::numeric_limits<uint64_t>::max();
-  // From when a frame's rendering begins until it is encoded.
+  // From when a frame's rendering begins until it is encoded, without its waiting for another turn:
+  // to be rendered again, or to be measured.
   std::chrono::milliseconds max_frame_time = std::chrono::milliseconds::max();
   int encode_threads = 1;
   // Whether to encode a small image of each kind of file at once, so that the first frame does not
@@ -115,6 +117,7 @@ class FramePipeline {
   void OnRendered(const FlightPtr& flight, FrameResult result);
   void OnRenderedToCompare(const FlightPtr& flight, FrameResult result);
   void OnCompared(const FlightPtr& flight);
+  void AwaitMeasurement(const FlightPtr& flight);
   void Measure(const FlightPtr& flight);
   void OnMade(const FlightPtr& flight);
   void Encode(const FlightPtr& flight);
@@ -138,9 +141,9 @@ class FramePipeline {
   uint64_t accepted_ = 0;
 
   WorkerPool workers_;
-  // One: a measurement has all cores to itself, but for what renders and encodes meanwhile. Posts
-  // to the workers, so it ends before them.
-  WorkerPool measurer_{1};
+  // One thread: a measurement has all cores to itself, but for what renders and encodes meanwhile.
+  // Posts to the workers, so it ends before them.
+  FairWorker measurer_;
   Timer timer_;
   FrameQueue queue_;
 };
