@@ -4,18 +4,18 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 
 namespace halflight::reference {
 namespace {
 
 constexpr size_t kLanes = 4;
 using Lanes = double __attribute__((vector_size(32)));
-using UnalignedLanes = double __attribute__((vector_size(32), aligned(8), may_alias));
 
 #define HALFLIGHT_INLINE inline __attribute__((always_inline))
 
 HALFLIGHT_INLINE void Load(const std::vector<double>& values, size_t index, Lanes& lanes) {
-  lanes = *reinterpret_cast<const UnalignedLanes*>(values.data() + index);
+  std::memcpy(&lanes, values.data() + index, sizeof(lanes));
 }
 
 // The last few elements; lanes beyond them get `otherwise`.

@@ -11,6 +11,7 @@
 #include "renderer/block_cache.h"
 #include "renderer/frame_engine.h"
 #include "renderer/frame_images.h"
+#include "renderer/raster_pieces.h"
 #include "renderer/stage_clock.h"
 #include "renderer/sweep/compositor.h"
 #include "renderer/sweep/device/compositor.h"
@@ -210,7 +211,9 @@ TEST_F(DeviceEye, DrawsFramesInRuns) {
   device.software = true;
   StageClock clock;
   FrameCache nothing_kept(0);
-  const DrawContext context{Device(), device, nothing_kept, request, particles, *plan, clock, {}};
+  RasterPieces pieces(device.software);
+  const DrawContext context{Device(),  device, nothing_kept, pieces, request,
+                            particles, *plan,  clock,        {}};
   const auto at_once = DrawOnDevice(context);
   const auto in_runs = DrawOnDevice(context, {.most_run_bytes = 1});
   ASSERT_TRUE(at_once.ok()) << at_once.status();
