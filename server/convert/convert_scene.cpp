@@ -1,16 +1,19 @@
 #include "server/convert/convert_scene.h"
 
 #include <algorithm>
+#include <optional>
 #include <string>
 #include <utility>
 
 #include <fmt/format.h>
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
 #include "renderer/target/features.h"
 #include "server/convert/convert_camera.h"
 #include "server/convert/enums.h"
 #include "server/convert/geometry.h"
+#include "server/convert/particle_bounds.h"
 
 namespace halflight {
 namespace {
@@ -160,12 +163,29 @@ ShadowSettings ConvertShadow(const v1::Shadow& shadow, const ServerLimits& limit
   return converted;
 }
 
+// One for all requests, so that a set is walked over once and not whenever it is named: requests
+// are converted on threads that answer calls.
+std::shared_ptr<const ParticleBounds> KnownBounds(const std::shared_ptr<const ParticleSet>& set) {
+  static BoundsCache cache;
+  return cache.Of(set);
+}
+
+bool IsAllowed(const glm::dvec3& offset) {
+  return kOffset.Contains(offset.x) && kOffset.Contains(offset.y) && kOffset.Contains(offset.z);
+}
+
 // Positions as they are after the offset keep to the bounds of those that are sent.
-void CheckMoved(const ParticleSet& particles, double time_offset_s, FieldChecks& checks) {
+void CheckMoved(const std::shared_ptr<const ParticleSet>& set, double time_offset_s,
+                FieldChecks& checks) {
+  const VectorRange reached = PositionsAfter(*KnownBounds(set), time_offset_s);
+  if (IsAllowed(reached.low) && IsAllowed(reached.high)) {
+    return;
+  }
+  const ParticleSet& particles = *set;
   for (size_t i = 0; i < particles.velocities.size() && checks.ok(); ++i) {
     const glm::dvec3 moved =
         glm::dvec3(particles.positions[i]) + time_offset_s * glm::dvec3(particles.velocities[i]);
-    if (!kOffset.Contains(moved.x) || !kOffset.Contains(moved.y) || !kOffset.Contains(moved.z)) {
+    if (!IsAllowed(moved)) {
       checks.Reject("scene.time_offset_s",
                     fmt::format("{}, which moves particle {} to ({}, {}, {})", time_offset_s, i,
                                 moved.x, moved.y, moved.z),
@@ -174,17 +194,51 @@ void CheckMoved(const ParticleSet& particles, double time_offset_s, FieldChecks&
   }
 }
 
+bool Moves(const Scene& scene) {
+  return scene.time_offset_s != 0.0 && !scene.particles->velocities.empty();
+}
+
+// Bounds of the scene's particles, without a walk over them where they are at rest.
+std::optional<BoundingSphere> BoundsOf(const Scene& scene) {
+  const ParticleSet& set = *scene.particles;
+  if (Moves(scene)) {
+    return Bounds(set, scene.material.radius, scene.time_offset_s);
+  }
+  std::optional<BoundingSphere> sphere = KnownBounds(scene.particles)->at_rest;
+  if (sphere.has_value() && set.radii.empty()) {
+    sphere->radius += scene.material.radius;
+  }
+  return sphere;
+}
+
+// Whether the point is so far from particles that move that they need not be walked over: the
+// middle of their bounding sphere is in the box, and its radius no more than half the diagonal and
+// a particle's.
+bool IsFarFrom(const Scene& scene, const glm::dvec3& point) {
+  constexpr double kRounding = 1e-9;
+  const ParticleSet& set = *scene.particles;
+  const auto bounds = KnownBounds(scene.particles);
+  const VectorRange box = PositionsAfter(*bounds, scene.time_offset_s);
+  const glm::dvec3 offset = point - set.origin;
+  const double distance =
+      glm::length(glm::max(glm::dvec3(0.0), glm::max(box.low - offset, offset - box.high)));
+  const double own = set.radii.empty() ? scene.material.radius : bounds->largest_radius;
+  const double radius = 0.5 * glm::length(box.high - box.low) + own;
+  return distance > radius + kRounding * (glm::length(point) + glm::length(set.origin) + radius);
+}
+
 // A light buffer shows the particles from the light through one frustum, so that a light among them
 // would see only some.
 void CheckPointLights(const Scene& scene, FieldChecks& checks) {
+  std::optional<BoundingSphere> bounds;  // once a light has asked
   for (size_t i = 0; i < scene.lights.size(); ++i) {
     const auto* const point = std::get_if<PointLight>(&scene.lights[i].kind);
-    if (point == nullptr || !scene.lights[i].casts_shadows()) {
+    if (point == nullptr || !scene.lights[i].casts_shadows() || scene.particles->size() == 0 ||
+        (Moves(scene) && IsFarFrom(scene, point->position))) {
       continue;
     }
-    const auto bounds = Bounds(*scene.particles, scene.material.radius, scene.time_offset_s);
     if (!bounds.has_value()) {
-      continue;
+      bounds = BoundsOf(scene);
     }
     const double distance = glm::length(point->position - bounds->center);
     if (!(distance > bounds->radius)) {
@@ -237,8 +291,8 @@ Scene ConvertScene(const v1::Scene& scene, std::shared_ptr<const ParticleSet> pa
     checks.Reject("scene.material.physical_scattering",
                   "set with a blur_mode of BLUR_MODE_TEXELS_PER_SLICE", "BLUR_MODE_DISTANCE");
   }
-  if (converted.time_offset_s != 0.0) {
-    CheckMoved(*converted.particles, converted.time_offset_s, checks);
+  if (checks.ok() && Moves(converted)) {
+    CheckMoved(converted.particles, converted.time_offset_s, checks);
   }
   return converted;
 }
