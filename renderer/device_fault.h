@@ -22,8 +22,8 @@ bool IsDeviceReset(const absl::Status& status);
 // Whether the frame may have been the cause of a reset.
 bool IsSuspect(const absl::Status& status);
 
-// Longer than it takes to cancel a frame and to ask for another.
-inline constexpr std::chrono::milliseconds kLateness(500);
+// Longer than it takes to cancel a frame and to ask for another, on a machine with much to do.
+inline constexpr std::chrono::milliseconds kLateness(2000);
 
 enum class DeviceFault : uint8_t {
   kNone,
@@ -32,7 +32,7 @@ enum class DeviceFault : uint8_t {
   kGone,           // reset, and never to be had again
   kOutOfMemory,
   kHang,  // for ever
-  kLate,  // at it for kLateness, whatever the frame
+  kLate,  // at it for kLateness more, whatever the frame
 };
 
 // Faults of a device that is sound. Drawings are numbered from 1 on, over all renderers that share

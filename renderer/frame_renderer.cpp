@@ -100,9 +100,11 @@ absl::StatusOr<DrawnFrame> FrameRenderer::Draw(const ShadowTechnique& technique,
       return absl::ResourceExhaustedError("planned: the device is out of memory");
     case DeviceFault::kHang:
       for (;;) std::this_thread::sleep_for(std::chrono::hours(1));
-    case DeviceFault::kLate:
+    case DeviceFault::kLate: {
+      absl::StatusOr<DrawnFrame> drawn = technique.Draw(context);
       frame.late_until = std::chrono::steady_clock::now() + kLateness;
-      break;
+      return drawn;
+    }
   }
   return technique.Draw(context);
 }

@@ -166,6 +166,7 @@ class BehindACancelledFrame : public DeviceReset {
  protected:
   void Begin(const std::string& faults, int cancelled) {
     Start(faults, 2);
+    EXPECT_TRUE(Render().ok());  // so that the programs are there
     begun_ = std::chrono::steady_clock::now();
     std::deque<std::future<Frame>> frames;
     std::stop_source stop;
@@ -188,7 +189,7 @@ class BehindACancelledFrame : public DeviceReset {
 
 // Any of both may have been the cause.
 TEST_F(BehindACancelledFrame, NoOtherIsASuspect) {
-  Begin("late:1,reset:2", 1);
+  Begin("late:2,reset:3", 1);
   const Frame other = Render();
   EXPECT_TRUE(IsDeviceReset(other.status())) << other.status();
   EXPECT_FALSE(IsSuspect(other.status()));
@@ -196,7 +197,7 @@ TEST_F(BehindACancelledFrame, NoOtherIsASuspect) {
 }
 
 TEST_F(BehindACancelledFrame, OneThatWantsToBeAloneWaits) {
-  Begin("late:1", 1);
+  Begin("late:2", 1);
   FrameRequest alone = Request();
   alone.alone = true;
   EXPECT_TRUE(Render(alone).ok());
@@ -204,7 +205,7 @@ TEST_F(BehindACancelledFrame, OneThatWantsToBeAloneWaits) {
 }
 
 TEST_F(BehindACancelledFrame, NoMoreAreBegunThanMayBeInFlight) {
-  Begin("late:1-2", 2);
+  Begin("late:2-3", 2);
   EXPECT_TRUE(Render().ok());
   EXPECT_TRUE(IsBehindThem());
 }

@@ -11,6 +11,16 @@
 
 #include <gtest/gtest.h>
 
+#ifndef __has_feature
+#define __has_feature(feature) 0
+#endif
+#if !defined(__GLIBC__) || defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__) || \
+    __has_feature(address_sanitizer) || __has_feature(thread_sanitizer)
+#define HALFLIGHT_OTHER_ALLOCATOR 1
+#else
+#define HALFLIGHT_OTHER_ALLOCATOR 0
+#endif
+
 namespace halflight {
 namespace {
 
@@ -36,7 +46,7 @@ int64_t BytesHeld() {
 }
 
 TEST(KeptMemory, ServesTheNextFrameUntilItIsGivenBack) {
-#if defined(__SANITIZE_ADDRESS__) || !defined(__GLIBC__)
+#if HALFLIGHT_OTHER_ALLOCATOR
   GTEST_SKIP() << "another allocator";
 #endif
   KeepFreedMemory();

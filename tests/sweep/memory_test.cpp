@@ -33,6 +33,11 @@ void* operator new(size_t bytes) {
   Count(malloc_usable_size(memory));
   return memory;
 }
+void* operator new(size_t bytes, const std::nothrow_t& /*tag*/) noexcept {
+  void* const memory = std::malloc(bytes);
+  if (memory != nullptr) Count(malloc_usable_size(memory));
+  return memory;
+}
 void* operator new(size_t bytes, std::align_val_t alignment) {
   const auto align = static_cast<size_t>(alignment);
   void* const memory = std::aligned_alloc(align, (bytes + align - 1) / align * align);
