@@ -21,6 +21,7 @@
 #include "tests/listen/client_socket.h"
 #include "tests/process/process.h"
 #include "tests/process/wait_for.h"
+#include "tests/sanitizers.h"
 
 namespace halflight {
 namespace {
@@ -147,6 +148,8 @@ class NoDescriptorsLeft {
 };
 
 TEST_F(AcceptorTest, WithoutDescriptorsHangsUpAndGoesOnWhenThereAreSome) {
+  // It looks whether memory can be read by writing it to a pipe, for which there is none.
+  if (testing::kSanitized) GTEST_SKIP() << "UBSan takes objects for none without descriptors";
   Listen(1000);
   // Made before: this process has no more either.
   std::vector<ClientSocket> early(20);

@@ -11,15 +11,7 @@
 
 #include <gtest/gtest.h>
 
-#ifndef __has_feature
-#define __has_feature(feature) 0
-#endif
-#if !defined(__GLIBC__) || defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__) || \
-    __has_feature(address_sanitizer) || __has_feature(thread_sanitizer)
-#define HALFLIGHT_OTHER_ALLOCATOR 1
-#else
-#define HALFLIGHT_OTHER_ALLOCATOR 0
-#endif
+#include "tests/sanitizers.h"
 
 namespace halflight {
 namespace {
@@ -46,9 +38,10 @@ int64_t BytesHeld() {
 }
 
 TEST(KeptMemory, ServesTheNextFrameUntilItIsGivenBack) {
-#if HALFLIGHT_OTHER_ALLOCATOR
+#ifndef __GLIBC__
   GTEST_SKIP() << "another allocator";
 #endif
+  if (testing::kSanitized) GTEST_SKIP() << "another allocator";
   KeepFreedMemory();
   MakeFrameElsewhere();
   const int64_t fetched = PagesFetched();
