@@ -12,7 +12,6 @@
 #include "tests/access/health.h"
 #include "tests/measure/timing.h"
 #include "tests/process/wait_for.h"
-#include "tests/sanitizers.h"
 #include "tests/soak/scenario.h"
 #include "tests/soak/scene.h"
 #include "tests/soak/server.h"
@@ -167,11 +166,7 @@ void RunConnections(Run& run) {
   run.report.AtLeast("slow readers ended by the server after their frame began",
                      static_cast<double>(aborted), slow, "");
   run.report.Tell("all of them ended after", took.count(), " s");
-  if (testing::kSanitized) {  // which keeps for a while what was freed
-    run.report.Tell("memory more, at most", memory_peak - memory_before, " MiB");
-  } else {
-    run.report.AtMost("memory more, at most", memory_peak - memory_before, 200, " MiB");
-  }
+  run.report.MemoryAtMost("memory more, at most", memory_peak - memory_before, 200);
   run.report.Tell("questions for health meanwhile", static_cast<double>(waits.size()), "");
   run.report.TimeAtMost("health answered within, 99.9th percentile",
                         measure::Quantile(waits, 0.999), 100, " ms");

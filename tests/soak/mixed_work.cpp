@@ -185,8 +185,8 @@ void RunMixedWork(Run& run) {
                               work.uploads.load(), work.cancelled.load(), work.errors.load()));
   run.report.None("other errors", work.unexpected);
   run.report.Tell("memory held at the end", held.back().y, " MiB");
-  run.report.AtMost("memory more, from when it was warm", held.back().y - held.front().y,
-                    run.Of(4, 40), " MiB");
+  run.report.MemoryAtMost("memory more, from when it was warm", held.back().y - held.front().y,
+                          run.Of(4, 40));
   if (!run.short_form) {
     run.report.AtMost("memory more an hour, once warm", slope.value, 1, " MiB");
     run.report.Tell("the same, 95 % interval",

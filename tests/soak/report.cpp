@@ -7,6 +7,8 @@
 
 #include <fmt/format.h>
 
+#include "tests/sanitizers.h"
+
 namespace halflight::soak {
 
 std::string Digits(double value) {
@@ -46,6 +48,14 @@ void Report::TimeAtMost(const std::string& property, double reached, double boun
     AtMost(property, reached, bound, unit);
   } else {
     Tell(property, reached, unit);
+  }
+}
+
+void Report::MemoryAtMost(const std::string& property, double reached, double bound) {
+  if (testing::kSanitized) {
+    Tell(property, reached, " MiB");
+  } else {
+    AtMost(property, reached, bound, " MiB");
   }
 }
 

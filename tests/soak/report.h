@@ -26,6 +26,8 @@ class Report {
                   const std::string& unit);
   void RateAtLeast(const std::string& property, double reached, double bound,
                    const std::string& unit);
+  // In MiB. Told alone where a sanitizer keeps for a while what was freed.
+  void MemoryAtMost(const std::string& property, double reached, double bound);
   // None of them: what is counted must not be.
   void None(const std::string& property, size_t count);
   void Holds(const std::string& property, bool holds, const std::string& reached = "");
