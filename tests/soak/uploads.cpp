@@ -199,6 +199,8 @@ void RunUploadServersKilled(Run& run) {
   size_t drawn = 0;
   for (const client::EncodedParticles& set : sets) {
     held += Query(*stub, set.sha256).complete() ? 1 : 0;
+  }
+  for (const client::EncodedParticles& set : sets) {
     v1::RenderFrameRequest request = SweepOf(set.sha256, 32);
     request.mutable_scene()->mutable_material()->set_radius(0.001F);
     drawn += client->RenderFrame(request, &set).ok() ? 1 : 0;
