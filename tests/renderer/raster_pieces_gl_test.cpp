@@ -36,7 +36,9 @@ class RasterPiecesTest : public test::GlTest {
   std::vector<Range> drawn_;
 };
 
-const QuadCosts kQuartersOfAPiece(10, static_cast<float>(RasterPieces::kMostCost / 4));
+QuadCosts QuartersOfAPiece() {
+  return QuadCosts(10, static_cast<float>(RasterPieces::kMostCost / 4));
+}
 
 TEST_F(RasterPiecesTest, LeaveASmallDrawWhole) {
   RasterPieces pieces(true);
@@ -47,10 +49,10 @@ TEST_F(RasterPiecesTest, LeaveASmallDrawWhole) {
 
 TEST_F(RasterPiecesTest, CutALargeDrawWhereItHasCostEnough) {
   RasterPieces pieces(true);
-  ASSERT_TRUE(Draw(pieces, kQuartersOfAPiece).ok());
+  ASSERT_TRUE(Draw(pieces, QuartersOfAPiece()).ok());
   EXPECT_THAT(drawn_, testing::ElementsAre(Range(0, 4), Range(4, 8), Range(8, 10)));
   // What the last piece lacks the next draw may have.
-  ASSERT_TRUE(Draw(pieces, kQuartersOfAPiece).ok());
+  ASSERT_TRUE(Draw(pieces, QuartersOfAPiece()).ok());
   EXPECT_EQ(drawn_.at(3), Range(0, 2));
   EXPECT_EQ(pieces.ended(), 5U);
 }
@@ -63,13 +65,13 @@ TEST_F(RasterPiecesTest, HoldOneQuadAtLeast) {
 
 TEST_F(RasterPiecesTest, EndWithTheOneThatIsStopped) {
   RasterPieces pieces(true);
-  EXPECT_TRUE(absl::IsCancelled(Draw(pieces, kQuartersOfAPiece, 2)));
+  EXPECT_TRUE(absl::IsCancelled(Draw(pieces, QuartersOfAPiece(), 2)));
   EXPECT_THAT(drawn_, testing::ElementsAre(Range(0, 4), Range(4, 8)));
 }
 
 TEST_F(RasterPiecesTest, AreNotCutOnAGpu) {
   RasterPieces pieces(false);
-  ASSERT_TRUE(Draw(pieces, kQuartersOfAPiece).ok());
+  ASSERT_TRUE(Draw(pieces, QuartersOfAPiece()).ok());
   EXPECT_THAT(drawn_, testing::ElementsAre(Range(0, 10)));
 }
 
