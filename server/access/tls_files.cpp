@@ -38,6 +38,12 @@ Owned<BIO> Reader(const std::string& text) {
 // Otherwise OpenSSL asks for one on the terminal.
 int NoPassword(char* /*buffer*/, int /*size*/, int /*writing*/, void* /*data*/) { return 0; }
 
+// A line that was to begin another certificate, which OpenSSL does not take for one.
+bool EndsInACutLine(const std::string& text) {
+  const std::string last = text.substr(text.rfind('\n') + 1);
+  return last.starts_with('-') && !last.starts_with("-----END");
+}
+
 // The first of the file, which must be nothing but certificates.
 absl::StatusOr<Owned<X509>> FirstCertificate(const std::string& path, const std::string& text) {
   const Owned<BIO> reader = Reader(text);
@@ -48,7 +54,7 @@ absl::StatusOr<Owned<X509>> FirstCertificate(const std::string& path, const std:
   while (Owned<X509>(PEM_read_bio_X509(reader.get(), nullptr, NoPassword, nullptr)) != nullptr) {
   }
   // What ends the file in order is that no line begins another one.
-  if (ERR_GET_REASON(ERR_peek_last_error()) != PEM_R_NO_START_LINE) {
+  if (ERR_GET_REASON(ERR_peek_last_error()) != PEM_R_NO_START_LINE || EndsInACutLine(text)) {
     return Wrong(path, "a certificate behind the first is damaged");
   }
   ERR_clear_error();
