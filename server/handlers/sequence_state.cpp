@@ -8,22 +8,21 @@ absl::StatusOr<FrameJob> SequenceState::Next(const v1::RenderFrameRequest& reque
                                              const Backend& backend) {
   const v1::Scene& scene = request.scene();
   v1::Scene& merged = *merged_.mutable_scene();
-  if (scene.has_particle_sha256()) {
+  if (scene.has_inline_particles()) {
+    auto brought = ResolveParticles(scene, backend.store, backend.limits);
+    if (!brought.ok()) {
+      return brought.status();
+    }
+    inline_ = *std::move(brought);
+    merged.clear_particles();
+  } else if (scene.has_particle_sha256()) {
     merged.set_particle_sha256(scene.particle_sha256());
     inline_.reset();
   }
-  const bool inherits_inline =
-      inline_.has_value() && scene.particles_case() == v1::Scene::PARTICLES_NOT_SET;
-  const bool brings = scene.has_inline_particles();
-  auto particles = inherits_inline
-                       ? *inline_
-                       : ResolveParticles(brings ? scene : merged, backend.store, backend.limits);
+  const auto particles =
+      inline_.has_value() ? *inline_ : ResolveParticles(merged, backend.store, backend.limits);
   if (!particles.ok()) {
     return particles.status();
-  }
-  if (brings) {
-    merged.clear_particles();
-    inline_ = *particles;
   }
 
   if (scene.has_time_offset_s()) {
