@@ -87,7 +87,7 @@ class RenderThread : public FrameEngine {
   absl::Status Serve(FrameRenderer& renderer);
   // From now on there are no frames.
   void End(const absl::Status& why);
-  void WarmUp(FrameRenderer& renderer);
+  Job WarmUpJob();
   // Of those that wait; they need not do so until it is their turn.
   void AnswerStopped();
   // The next job, if it may be begun beside these. Waits for one where there are none; none when
@@ -108,6 +108,7 @@ class RenderThread : public FrameEngine {
   absl::Status end_;                                      // guarded by mutex_
   std::optional<Clock::time_point> starting_anew_since_;  // guarded by mutex_
   uint64_t resets_ = 0;                                   // guarded by mutex_
+  std::stop_source warming_up_{std::nostopstate};         // guarded by mutex_: of WarmUpJob
   StopTimes stop_times_;
   std::deque<FrameRequest> warm_up_;  // of the thread's own
   std::thread thread_;
@@ -121,15 +122,19 @@ absl::Status RenderThread::Start() {
 }
 
 RenderThread::~RenderThread() {
+  std::stop_source warming_up(std::nostopstate);
   {
     const std::lock_guard lock(mutex_);
     stopping_ = true;
+    warming_up = warming_up_;
   }
   changed_.notify_all();
+  warming_up.request_stop();
   if (thread_.joinable()) thread_.join();
 }
 
 absl::Status RenderThread::Submit(FrameRequest request, std::stop_token stop, Done done) {
+  std::stop_source warming_up(std::nostopstate);
   {
     const std::lock_guard lock(mutex_);
     if (!end_.ok()) return end_;
@@ -141,8 +146,10 @@ absl::Status RenderThread::Submit(FrameRequest request, std::stop_token stop, Do
     }
     ++unfinished_;
     jobs_.push_back({std::move(request), std::move(stop), std::move(done), Clock::now()});
+    warming_up = warming_up_;
   }
   changed_.notify_all();
+  warming_up.request_stop();
   return absl::OkStatus();
 }
 
@@ -166,7 +173,10 @@ EngineState RenderThread::state() const {
 std::optional<RenderThread::Job> RenderThread::NextJob(const FrameRenderer& renderer,
                                                        const Flights& flights) {
   std::unique_lock lock(mutex_);
-  if (flights.count() == 0) changed_.wait(lock, [&] { return stopping_ || !jobs_.empty(); });
+  if (flights.count() == 0) {
+    changed_.wait(lock, [&] { return stopping_ || !jobs_.empty() || !warm_up_.empty(); });
+    if (jobs_.empty() && !stopping_ && !warm_up_.empty()) return WarmUpJob();
+  }
   if (jobs_.empty()) return std::nullopt;
   const FrameRequest& next = jobs_.front().request;
   if (flights.alone() || (next.alone && flights.count() > 0)) return std::nullopt;
@@ -260,7 +270,6 @@ absl::Status RenderThread::Serve(FrameRenderer& renderer) {
     const auto wait = begun ? std::chrono::milliseconds(0) : kPatience;
     if (oldest.frame.ok() && !renderer.CanFinish(**oldest.frame, wait)) continue;
     Finish(renderer, flights);
-    if (flights.frames.empty()) WarmUp(renderer);
   }
 }
 
@@ -274,17 +283,18 @@ void RenderThread::End(const absl::Status& why) {
   for (const Job& job : jobs) Answer(job.done, why);
 }
 
-// Ends where there is a job: what a request wants goes before what others may want.
-void RenderThread::WarmUp(FrameRenderer& renderer) {
-  while (!warm_up_.empty()) {
-    {
-      const std::lock_guard lock(mutex_);
-      if (stopping_ || !jobs_.empty()) return;
-    }
-    // Whoever asks for such a frame is told what is wrong with it.
-    renderer.Render(warm_up_.front(), {}).IgnoreError();
-    warm_up_.pop_front();
-  }
+// What is drawn where nobody waits: a request ends it, so as not to wait for what others may want.
+// Under the mutex.
+RenderThread::Job RenderThread::WarmUpJob() {
+  warming_up_ = {};
+  ++unfinished_;
+  return {warm_up_.front(), warming_up_.get_token(),
+          [this](const absl::StatusOr<FrameResult>& frame) {
+            // The turn of one that was stopped comes again. Whoever asks for such a frame is told
+            // what is wrong with it.
+            if (!absl::IsCancelled(frame.status())) warm_up_.pop_front();
+          },
+          Clock::now()};
 }
 
 void RenderThread::Run(std::promise<absl::Status> started) {
@@ -301,7 +311,6 @@ void RenderThread::Run(std::promise<absl::Status> started) {
   if (options_.warm_up) {
     const std::vector<FrameRequest> frames = WarmUpFrames();
     warm_up_.assign(frames.begin(), frames.end());
-    WarmUp(**renderer);
   }
   while (!Serve(**renderer).ok()) {
     {

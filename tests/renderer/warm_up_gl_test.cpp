@@ -2,11 +2,17 @@
 // anybody's way.
 #include "renderer/warm_up.h"
 
+#include <chrono>
 #include <future>
+#include <memory>
 #include <string>
+#include <thread>
 
 #include <gtest/gtest.h>
 
+#include "absl/strings/str_cat.h"
+#include "renderer/device_fault.h"
+#include "renderer/gl/object.h"
 #include "renderer/render_thread.h"
 #include "tests/renderer/gl_fixture.h"
 
@@ -71,6 +77,38 @@ TEST(WarmEngine, RendersWhatAnotherDoesAtWhateverTime) {
     }
   }
   for (const std::vector<float>& frame : pixels) EXPECT_EQ(frame, pixels[0]);
+}
+
+// What clients ask for ends a frame that nobody asked for, which is drawn when they are served.
+TEST(WarmEngine, MakesRoomForRequestsAndTakesUpWhatItLeft) {
+  const size_t frames = WarmUpFrames().size();
+  const uint64_t objects_before = gl::HeldMemory().objects;
+  // The first, then the client's, then all of them; the last tells that it was drawn.
+  auto faults = PlannedFaults::Parse(absl::StrCat("late:1,innocent-reset:", frames + 2));
+  ASSERT_TRUE(faults.ok()) << faults.status();
+  auto engine = StartRenderThread(
+      {.renderer = {.faults = std::make_shared<PlannedFaults>(*faults)}, .warm_up = true});
+  ASSERT_TRUE(engine.ok()) << engine.status();
+  const auto wait_for = [&engine](const auto& what) {
+    const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(120);
+    while (!what((*engine)->state()) && std::chrono::steady_clock::now() < until) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+    return what((*engine)->state());
+  };
+  ASSERT_TRUE(wait_for([&](const EngineState& state) { return state.gl_objects > objects_before; }))
+      << "no frame has begun";
+  std::promise<absl::Status> done;
+  ASSERT_TRUE((*engine)
+                  ->Submit(test::Beauty(test::BallScene(50)), {},
+                           [&done](const absl::StatusOr<FrameResult>& frame) {
+                             done.set_value(frame.status());
+                           })
+                  .ok());
+  const absl::Status drawn = done.get_future().get();
+  EXPECT_TRUE(drawn.ok()) << drawn;
+  EXPECT_TRUE(wait_for([](const EngineState& state) { return state.device_resets == 1; }))
+      << "not all " << frames << " were drawn after it";
 }
 
 }  // namespace
