@@ -36,8 +36,6 @@ class BrokenRenderThread : public FrameEngine {
             Leak(stop.stop_requested());
           } else if (fault_ == "forgets") {
             ++change_;
-          } else if (fault_ == "loses" && ++frames_ % 5 == 0) {
-            result = absl::UnavailableError("lost");
           }
           if (result.ok()) {
             for (Image& image : result->images) {
@@ -48,6 +46,11 @@ class BrokenRenderThread : public FrameEngine {
         });
   }
   [[nodiscard]] const DeviceInfo& device() const override { return engine_.device(); }
+  [[nodiscard]] EngineState state() const override {
+    EngineState state = engine_.state();
+    state.gl_objects += kept_objects_;
+    return state;
+  }
 
  private:
   // On the engine's thread.
@@ -56,6 +59,7 @@ class BrokenRenderThread : public FrameEngine {
     kept_.emplace_back(kBytes, 'x');
     if (cancelled) {
       ++change_;
+      ++kept_objects_;
       kept_descriptors_.push_back(dup(STDERR_FILENO));
       kept_threads_.emplace_back([](const std::stop_token& stop) {
         while (!stop.stop_requested()) {
@@ -67,7 +71,7 @@ class BrokenRenderThread : public FrameEngine {
 
   const std::string fault_;
   int change_ = 0;
-  int frames_ = 0;
+  std::atomic<uint64_t> kept_objects_ = 0;
   std::vector<std::string> kept_;
   std::vector<int> kept_descriptors_;
   std::vector<std::jthread> kept_threads_;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <csignal>
 #include <memory>
 #include <optional>
 #include <thread>
@@ -99,14 +100,15 @@ class SlowReader {
 
 void RunConnections(Run& run) {
   RaiseOwnLimit();
-  const int clients = run.Of(1000, 60);
+  // Sabotaged: as many as hold more than is allowed.
+  const int clients = run.sabotage ? 160 : run.Of(1000, 60);
   const int slow = clients / 2;
   const int stall_seconds = run.Of(5, 1);
   const testing::Folder folder;
   // A frame of 4 MB: what all of them may hold is bounded, as anybody would who serves strangers.
-  const Server server(folder,
-                      {"--max-stall-seconds", run.sabotage ? "0" : std::to_string(stall_seconds),
-                       "--max-output-bytes", "8MiB", "--max-frame-bytes", "96MiB"});
+  const Server server(
+      folder, {"--max-stall-seconds", run.sabotage ? "0" : std::to_string(stall_seconds),
+               "--max-output-bytes", "8MiB", "--max-frame-bytes", run.sabotage ? "4GiB" : "96MiB"});
   const client::EncodedParticles particles = BallOf(2000);
   Upload(server.address(), particles);
   const v1::RenderFrameRequest large = SweepOf(particles.sha256, 512);
@@ -128,6 +130,11 @@ void RunConnections(Run& run) {
       readers.push_back(std::make_unique<SlowReader>(NarrowChannel(server.address()), large,
                                                      milliseconds(1000 * stall_seconds + 500)));
     }
+  }
+  if (run.sabotage) {
+    server.Signal(SIGSTOP);
+    std::this_thread::sleep_for(milliseconds(300));
+    server.Signal(SIGCONT);
   }
   const auto begin = Clock::now();
   // What a stall, and the frames that are let in at a time, add up to; and as much again.

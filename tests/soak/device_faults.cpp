@@ -42,7 +42,11 @@ void ResetUnderLoad(Run& run, const client::EncodedParticles& particles) {
   for (int i = 1; i <= resets; ++i) {
     plan += fmt::format("{}innocent-reset:{}", i > 1 ? "," : "", i * kBetweenResets);
   }
-  const Server server(folder, {"--plan-device-faults", plan});
+  std::vector<std::string> flags = {"--plan-device-faults", plan};
+  if (run.sabotage) {
+    flags.insert(flags.end(), {"--device", "forgets"});
+  }
+  const Server server(folder, flags, run.sabotage ? "halflightd_broken" : "halflightd");
   Upload(server.address(), particles);
   const std::vector<v1::RenderFrameRequest> requests = RequestsOf(particles);
   const auto channel = testing::NewChannel(server.address());
@@ -62,7 +66,9 @@ void ResetUnderLoad(Run& run, const client::EncodedParticles& particles) {
       const auto own = testing::NewChannel(server.address());
       std::mt19937 random(static_cast<uint32_t>(client));
       const auto until = Clock::now() + std::chrono::minutes(5);
-      while (seen < resets && Clock::now() < until) {
+      // As many frames as bring all resets, and as many again.
+      const auto most = static_cast<int>(2 * resets * kBetweenResets);
+      while (seen < resets && drawn < most && Clock::now() < until) {
         const size_t which = random() % requests.size();
         CallOptions ask = Ask(requests[which]);
         ask.keep_frame = true;

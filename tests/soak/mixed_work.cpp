@@ -187,7 +187,7 @@ void RunMixedWork(Run& run) {
   run.report.Tell("memory held at the end", held.back().y, " MiB");
   run.report.MemoryAtMost("memory more, from when it was warm", held.back().y - held.front().y,
                           run.Of(4, 40));
-  if (!run.short_form) {
+  if (!run.short_form || run.sabotage) {
     run.report.AtMost("memory more an hour, once warm", slope.value, 1, " MiB");
     run.report.Tell("the same, 95 % interval",
                     Digits(slope.low) + " to " + Digits(slope.high) + " MiB");

@@ -94,21 +94,28 @@ struct Losses {
   size_t not_finished = 0;  // the log says accepted, and another outcome than OK
 };
 
-// A frame that was accepted has a line with its sizes, whatever became of it; one that was refused
-// has none of them.
-void ReadLog(const std::string& log, const std::map<std::string, Seen>& seen, Losses& losses) {
-  const std::string key = " frame request_id=";
+// The lines of an event that is of a request, by its id.
+std::map<std::string, std::string> LinesOf(const std::string& event, const std::string& log) {
+  std::map<std::string, std::string> lines;
+  const std::string key = " " + event + " request_id=";
   for (size_t at = log.find(key); at != std::string::npos; at = log.find(key, at + 1)) {
     const size_t id_at = at + key.size();
-    const std::string id = log.substr(id_at, log.find(' ', id_at) - id_at);
-    const std::string line = log.substr(at, log.find('\n', at) - at);
-    if (line.find(" size=") == std::string::npos) {
-      continue;
-    }
+    lines[log.substr(id_at, log.find_first_of(" \n", id_at) - id_at)] =
+        log.substr(at, log.find('\n', at) - at);
+  }
+  return lines;
+}
+
+// That a frame was accepted is told when it is, what became of it at its end.
+void ReadLog(const std::string& log, const std::map<std::string, Seen>& seen, Losses& losses) {
+  const auto ends = LinesOf("frame", log);
+  for (const auto& [id, line] : LinesOf("frame_accepted", log)) {
     ++losses.accepted;
     const auto found = seen.find(id);
     losses.never_came += found == seen.end() || !found->second.whole ? 1 : 0;
-    losses.not_finished += line.find("outcome=OK") == std::string::npos ? 1 : 0;
+    const auto end = ends.find(id);
+    losses.not_finished +=
+        end == ends.end() || end->second.find("outcome=OK") == std::string::npos ? 1 : 0;
   }
 }
 
@@ -117,9 +124,9 @@ void ReadLog(const std::string& log, const std::map<std::string, Seen>& seen, Lo
 void RunRestarts(Run& run) {
   const testing::Folder folder;
   const std::string address = "unix:" + folder / "socket";
-  std::vector<std::string> flags = {"--address", address};
+  std::vector<std::string> flags = {"--address", address, "--log-level", "debug"};
   if (run.sabotage) {
-    flags.insert(flags.end(), {"--drain-seconds", "0", "--device", "loses"});
+    flags.insert(flags.end(), {"--drain-seconds", "0"});
   }
   const client::EncodedParticles particles = BallOf(2000);
   std::mt19937 random(8);
@@ -128,7 +135,7 @@ void RunRestarts(Run& run) {
   double longest_drain_ms = 0.0;
   const int restarts = run.Of(100, 2);
   for (int i = 0; i < restarts; ++i) {
-    Server server(folder, flags, run.sabotage ? "halflightd_broken" : "halflightd");
+    Server server(folder, flags);
     Clients clients(address, particles);
     Require(testing::WaitFor([&] { return clients.whole() >= 4; }), "frames before the restart");
     std::this_thread::sleep_for(std::chrono::milliseconds(random() % 100));
