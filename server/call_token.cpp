@@ -41,6 +41,24 @@ absl::Status OutcomeOf(const absl::Status& status, Cancellation by) {
 
 }  // namespace
 
+bool CallCount::Enter(const std::string& client, uint32_t most) {
+  const std::lock_guard lock(mutex_);
+  uint32_t& calls = active_of_client_[client];
+  if (calls >= most) {
+    return false;
+  }
+  ++calls;
+  return true;
+}
+
+void CallCount::Leave(const std::string& client) {
+  const std::lock_guard lock(mutex_);
+  const auto found = active_of_client_.find(client);
+  if (--found->second == 0) {
+    active_of_client_.erase(found);
+  }
+}
+
 CallToken::CallToken(Rpc rpc, CallCount& count, const Backend& backend, const Access& access,
                      grpc::CallbackServerContext& context, const std::string& request_id)
     : rpc_(rpc),
@@ -63,10 +81,16 @@ CallToken::CallToken(Rpc rpc, CallCount& count, const Backend& backend, const Ac
     return;
   }
   auto tenant = access.TenantOf(context);
-  if (tenant.ok()) {
-    caller_.tenant = *std::move(tenant);
-  } else {
+  if (!tenant.ok()) {
     refusal_ = WithReason(tenant.status(), v1::ERROR_REASON_UNAUTHENTICATED);
+    return;
+  }
+  caller_.tenant = *std::move(tenant);
+  const uint32_t most = backend.limits.max_client_calls;
+  entered_ = count_.Enter(caller_.client(), most);
+  if (!entered_) {
+    refusal_ = BusyError(v1::ERROR_REASON_TOO_MANY_CALLS, "another call of this client",
+                         fmt::format("at most {} of one client", most));
   }
 }
 
@@ -75,6 +99,9 @@ CallToken::~CallToken() {
   const absl::Status outcome = OutcomeOf(outcome_, by);
   metrics_.OnCall(rpc_, outcome, by);
   WriteLog(outcome, by);
+  if (entered_) {
+    count_.Leave(caller_.client());
+  }
   --count_.active_of[static_cast<size_t>(rpc_)];
   --count_.active;
 }

@@ -6,7 +6,9 @@
 #include <atomic>
 #include <chrono>
 #include <cstdint>
+#include <mutex>
 #include <string>
+#include <unordered_map>
 
 #include <grpcpp/server_context.h>
 #include <grpcpp/support/status.h>
@@ -25,6 +27,14 @@ struct CallCount {
   std::array<std::atomic<int>, kRpcs> active_of{};
   std::atomic<uint64_t> begun = 0;
   std::atomic<bool> draining = false;
+
+  // One more of a client's calls; false, and nothing changed, where it has as many as it may.
+  bool Enter(const std::string& client, uint32_t most);
+  void Leave(const std::string& client);
+
+ private:
+  std::mutex mutex_;
+  std::unordered_map<std::string, uint32_t> active_of_client_;  // none at 0
 };
 
 // Counted before draining is looked at, so that whoever drains and then sees no calls can be sure
@@ -69,6 +79,7 @@ class CallToken {
   grpc::CallbackServerContext& context_;
   const std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
   Caller caller_;
+  bool entered_ = false;  // among the client's calls
   absl::Status refusal_;
   std::atomic<uint64_t> received_ = 0;
   std::atomic<uint64_t> sent_ = 0;

@@ -20,6 +20,12 @@ std::string PayloadOf(const absl::Status& status, const char* name) {
   return payload.has_value() ? static_cast<std::string>(*payload) : std::string();
 }
 
+absl::Status WithBounds(absl::Status status, const std::string& value, const std::string& allowed) {
+  status.SetPayload(kValuePayload, absl::Cord(value));
+  status.SetPayload(kAllowedPayload, absl::Cord(allowed));
+  return status;
+}
+
 }  // namespace
 
 ErrorDetail DetailOf(const absl::Status& status) {
@@ -57,9 +63,13 @@ absl::Status BusyError(v1::ErrorReason reason, const std::string& value,
                        const std::string& allowed) {
   absl::Status status =
       absl::ResourceExhaustedError(absl::StrCat(value, ", allowed: ", allowed, ": retry later"));
-  status.SetPayload(kValuePayload, absl::Cord(value));
-  status.SetPayload(kAllowedPayload, absl::Cord(allowed));
-  return WithRetryHint(WithReason(std::move(status), reason));
+  return WithRetryHint(WithReason(WithBounds(std::move(status), value, allowed), reason));
+}
+
+absl::Status TooLongError(const std::string& value, const std::string& allowed) {
+  absl::Status status = absl::DeadlineExceededError(absl::StrCat(value, ", allowed: ", allowed));
+  return WithReason(WithBounds(std::move(status), value, allowed),
+                    v1::ERROR_REASON_FRAME_TIME_EXCEEDED);
 }
 
 absl::Status DrainingError() {

@@ -31,6 +31,9 @@ absl::Status WithReason(absl::Status status, v1::ErrorReason reason);
 absl::Status LimitError(const std::string& field, const std::string& value,
                         const std::string& allowed);
 
+// DeadlineExceeded: `value` is what it came to, `allowed` the limit, both in words.
+absl::Status TooLongError(const std::string& value, const std::string& allowed);
+
 // ResourceExhausted, passing: the same request may be accepted after some time. `value`: what was
 // asked for or is there, `allowed`: the limit, both in words.
 absl::Status BusyError(v1::ErrorReason reason, const std::string& value,

@@ -47,13 +47,6 @@ absl::Status FromEngine(const absl::Status& status) {
 
 absl::Status CallCancelled() { return absl::CancelledError("the call was cancelled"); }
 
-absl::Status TooLongError(std::chrono::milliseconds allowed) {
-  return WithReason(absl::DeadlineExceededError(
-                        fmt::format("the frame took longer than this server allows: at most {} s",
-                                    std::chrono::duration<double>(allowed).count())),
-                    v1::ERROR_REASON_FRAME_TIME_EXCEEDED);
-}
-
 double QueueMilliseconds(const FrameResult& result) {
   double waited = 0.0;
   for (const StageTiming& timing : result.timings) {
@@ -64,14 +57,6 @@ double QueueMilliseconds(const FrameResult& result) {
 
 }  // namespace
 
-// A frame's part of the memory that frames may take.
-struct FramePipeline::Account {
-  explicit Account(std::shared_ptr<ByteBudget> of) : budget(std::move(of)), share(*budget) {}
-
-  const std::shared_ptr<ByteBudget> budget;
-  ByteBudget::Share share;
-};
-
 // Everything that flows between the stages of one frame. Each stage writes its own part; the last
 // output to be encoded sees all of it through `outputs_left`.
 struct FramePipeline::Flight {
@@ -81,7 +66,7 @@ struct FramePipeline::Flight {
   std::optional<std::stop_callback<std::function<void()>>> on_client_stop;
   Done done;
   Clock::time_point submitted;
-  std::shared_ptr<Account> account;
+  std::shared_ptr<FrameAdmission::Memory> memory;
 
   std::atomic<bool> rendering_begun = false;
   std::optional<TimeLimit> time_limit;
@@ -94,7 +79,7 @@ struct FramePipeline::Flight {
   Clock::time_point compared_submitted;
 
   Clock::time_point encode_begin;
-  std::mutex mutex;
+  std::mutex mutex;  // of what outputs do at once, to `outcome` and `time_limit`
   std::atomic<size_t> outputs_left = 0;
   std::vector<SharedImage> images;  // the frame's, whose own have their shapes only from then on
   std::vector<EncodedImage> encoded;
@@ -103,18 +88,15 @@ struct FramePipeline::Flight {
 FramePipeline::FramePipeline(FrameEngine& engine, PipelineOptions options)
     : engine_(engine),
       options_(std::move(options)),
-      frame_memory_(std::make_shared<ByteBudget>(options_.max_frame_bytes)),
-      workers_(options_.encode_threads),
+      admission_(options_.admission),
+      encoders_(options_.encode_threads),
       queue_(engine, engine.frames_in_flight()) {
   if (options_.warm_up) {
-    workers_.Post([this] { WarmUp(); });
+    encoders_.Post({.run = [this] { WarmUp(); }});
   }
 }
 
-FramePipeline::~FramePipeline() {
-  std::unique_lock lock(mutex_);
-  idle_.wait(lock, [this] { return flights_ == 0; });
-}
+FramePipeline::~FramePipeline() { admission_.WaitUntilIdle(); }
 
 void FramePipeline::WarmUp() {
   const auto image = std::make_shared<const Image>(
@@ -125,41 +107,18 @@ void FramePipeline::WarmUp() {
   }
 }
 
-absl::Status FramePipeline::Admit(const FrameJob& job, Flight& flight) {
-  flight.account = std::make_shared<Account>(frame_memory_);
-  const std::lock_guard lock(mutex_);
-  if (queued_ >= options_.max_queued_frames) {
-    return BusyError(v1::ERROR_REASON_QUEUE_FULL, fmt::format("{} frames are under way", queued_),
-                     fmt::format("at most {}", options_.max_queued_frames));
-  }
-  const auto own = queued_of_.find(job.caller.client());
-  if (own != queued_of_.end() && own->second >= options_.max_client_frames) {
-    return BusyError(v1::ERROR_REASON_CLIENT_QUEUE_FULL,
-                     fmt::format("{} frames of this client are under way", own->second),
-                     fmt::format("at most {}", options_.max_client_frames));
-  }
-  if (!flight.account->share.Grow(job.pixel_bytes)) {
-    return BusyError(v1::ERROR_REASON_FRAME_MEMORY_FULL,
-                     fmt::format("the frame takes up to {} bytes", job.pixel_bytes),
-                     fmt::format("{} for all frames, of which {} are left",
-                                 options_.max_frame_bytes, frame_memory_->left()));
-  }
-  ++queued_;
-  ++queued_of_[job.caller.client()];
-  ++flights_;
-  ++accepted_;
-  return absl::OkStatus();
-}
-
 absl::Status FramePipeline::Submit(FrameJob job, std::stop_token stop, Done done) {
-  auto flight = std::make_shared<Flight>();
-  if (absl::Status status = Admit(job, *flight); !status.ok()) {
-    return status;
+  auto memory = admission_.Admit(job.caller.client(), job.pixel_bytes);
+  if (!memory.ok()) {
+    return memory.status();
   }
+  auto flight = std::make_shared<Flight>();
+  flight->memory = *std::move(memory);
   if (job.request_id.empty()) {
     job.request_id = MakeRequestId();
   }
   flight->job = std::move(job);
+  Log(LogLevel::kDebug, "frame_accepted", {{"request_id", flight->job.request_id}});
   flight->done = std::move(done);
   flight->submitted = Clock::now();
   flight->time_limit.emplace(timer_, options_.max_frame_time, [weak = std::weak_ptr(flight)] {
@@ -177,7 +136,7 @@ absl::Status FramePipeline::Submit(FrameJob job, std::stop_token stop, Done done
   if (flight->job.target.has_value()) {
     // Whichever thread lets it begin has work of its own.
     flight->job.target->knowledge->Enter(
-        [this, flight] { workers_.Post([this, flight] { BeginSearch(flight); }); });
+        [this, flight] { short_work_.Post([this, flight] { BeginSearch(flight); }); });
     return absl::OkStatus();
   }
   flight->measure = flight->job.measure;
@@ -185,25 +144,6 @@ absl::Status FramePipeline::Submit(FrameJob job, std::stop_token stop, Done done
   Render(flight, flight->job.request, &FramePipeline::OnRendered);
   return absl::OkStatus();
 }
-
-uint32_t FramePipeline::queued() const {
-  const std::lock_guard lock(mutex_);
-  return queued_;
-}
-
-size_t FramePipeline::waiting() const { return queue_.waiting(); }
-
-bool FramePipeline::idle() const {
-  const std::lock_guard lock(mutex_);
-  return flights_ == 0;
-}
-
-uint64_t FramePipeline::accepted() const {
-  const std::lock_guard lock(mutex_);
-  return accepted_;
-}
-
-uint64_t FramePipeline::memory_bytes() const { return frame_memory_->used(); }
 
 void FramePipeline::BeginSearch(const FlightPtr& flight) {
   flight->search.emplace(flight->job, costs_);
@@ -330,7 +270,7 @@ void FramePipeline::Measure(const FlightPtr& flight) {
 
 void FramePipeline::OnMade(const FlightPtr& flight) {
   if (flight->search.has_value()) {
-    workers_.Post([this, flight] { NextPass(flight); });
+    short_work_.Post([this, flight] { NextPass(flight); });
   } else {
     Encode(flight);
   }
@@ -351,8 +291,15 @@ void FramePipeline::Encode(const FlightPtr& flight) {
   const size_t outputs = flight->job.outputs.size();
   flight->encoded.resize(outputs);
   flight->outputs_left = outputs;
+  flight->time_limit->Pause();
   for (size_t i = 0; i < outputs; ++i) {
-    workers_.Post([this, flight, i] { EncodeOutput(flight, i); });
+    encoders_.Post(
+        {.client = flight->job.caller.client(),
+         .priority = flight->job.priority,
+         .stop = flight->stop.get_token(),
+         .run = [this, flight, i] { EncodeOutput(flight, i); },
+         .cancelled = [this, flight,
+                       i] { short_work_.Post([this, flight, i] { EncodeOutput(flight, i); }); }});
   }
 }
 
@@ -360,6 +307,10 @@ void FramePipeline::EncodeOutput(const FlightPtr& flight, size_t index) {
   const OutputJob& output = flight->job.outputs[index];
   absl::StatusOr<EncodedImage> encoded = CallCancelled();
   if (!flight->stop.stop_requested()) {
+    {
+      const std::lock_guard lock(flight->mutex);
+      flight->time_limit->Run();
+    }
     EncodeSettings settings = output.encoding;
     settings.stop = flight->stop.get_token();
     encoded = options_.encode(flight->images[output.image], output.shown.kind,
@@ -385,7 +336,10 @@ void FramePipeline::Complete(const FlightPtr& flight) {
   flight->on_client_stop.reset();
   flight->time_limit->Pause();
   if (flight->took_too_long && absl::IsCancelled(flight->outcome)) {
-    flight->outcome = TooLongError(options_.max_frame_time);
+    flight->outcome =
+        TooLongError("a frame that takes longer",
+                     fmt::format("at most {} s",
+                                 std::chrono::duration<double>(options_.max_frame_time).count()));
   }
   const auto now = Clock::now();
   if (!flight->outcome.ok()) {
@@ -410,8 +364,8 @@ void FramePipeline::Complete(const FlightPtr& flight) {
       bytes += encoded.bytes.size();
       frame->outputs.push_back(std::move(encoded.bytes));
     }
-    flight->account->share.ShrinkTo(bytes);
-    frame->accounted = flight->account;
+    flight->memory->ShrinkTo(bytes);
+    frame->accounted = flight->memory;
     answer = std::shared_ptr<const EncodedFrame>(std::move(frame));
   } else {
     answer = flight->outcome;
@@ -420,24 +374,15 @@ void FramePipeline::Complete(const FlightPtr& flight) {
   // the pixels where raw floats were asked for.
   flight->frame = {};
   flight->images.clear();
-  flight->account.reset();
-  {
-    const std::lock_guard lock(mutex_);
-    --queued_;
-    const auto own = queued_of_.find(flight->job.caller.client());
-    if (--own->second == 0) {
-      queued_of_.erase(own);
-    }
-  }
+  flight->memory.reset();
+  admission_.OnEncoded(flight->job.caller.client());
   std::exchange(flight->done, nullptr)(std::move(answer));
-  const std::lock_guard lock(mutex_);
-  --flights_;
-  idle_.notify_all();
+  admission_.OnEnded();
 }
 
 void FramePipeline::Fail(const FlightPtr& flight, absl::Status status) {
   flight->outcome = std::move(status);
-  workers_.Post([this, flight] { Complete(flight); });
+  short_work_.Post([this, flight] { Complete(flight); });
 }
 
 }  // namespace halflight

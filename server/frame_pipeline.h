@@ -5,25 +5,21 @@
 #pragma once
 
 #include <chrono>
-#include <condition_variable>
 #include <cstdint>
 #include <functional>
-#include <limits>
 #include <memory>
-#include <mutex>
 #include <stop_token>
 #include <string>
-#include <unordered_map>
 #include <vector>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "halflight/v1/frame.pb.h"
 #include "renderer/frame_engine.h"
-#include "server/byte_budget.h"
 #include "server/convert/convert_frame.h"
 #include "server/encode/encode.h"
-#include "server/fair_worker.h"
+#include "server/fair_workers.h"
+#include "server/frame_admission.h"
 #include "server/frame_measurement.h"
 #include "server/frame_queue.h"
 #include "server/frame_search.h"
@@ -43,10 +39,7 @@ struct EncodedFrame {
 };
 
 struct PipelineOptions {
-  uint32_t max_queued_frames = 64;  // accepted and not yet encoded
-  uint32_t max_client_frames = 64;  // of these, of one client
-  // Of pixels, and once a frame is encoded of its files, until the frame is sent.
-  uint64_t max_frame_bytes = std::numeric_limits<uint64_t>::max();
+  AdmissionLimits admission{};
   // From when a frame's rendering begins until it is encoded, without its waiting for another turn:
   // to be rendered again, or to be measured.
   std::chrono::milliseconds max_frame_time = std::chrono::milliseconds::max();
@@ -90,24 +83,20 @@ class FramePipeline {
   absl::Status Submit(FrameJob job, std::stop_token stop, Done done);
 
   // Frames accepted and not yet encoded. Any thread.
-  [[nodiscard]] uint32_t queued() const;
+  [[nodiscard]] uint32_t queued() const { return admission_.queued(); }
   // Frames that wait for the engine. Any thread.
-  [[nodiscard]] size_t waiting() const;
+  [[nodiscard]] size_t waiting() const { return queue_.waiting(); }
   // Whether no frame is anywhere between Submit and the end of `done`. Any thread.
-  [[nodiscard]] bool idle() const;
+  [[nodiscard]] bool idle() const { return admission_.idle(); }
   // Frames that were ever accepted. Any thread.
-  [[nodiscard]] uint64_t accepted() const;
+  [[nodiscard]] uint64_t accepted() const { return admission_.accepted(); }
   // What frames hold until they are sent. Any thread.
-  [[nodiscard]] uint64_t memory_bytes() const;
+  [[nodiscard]] uint64_t memory_bytes() const { return admission_.memory_bytes(); }
 
  private:
   struct Flight;
   using FlightPtr = std::shared_ptr<Flight>;
   using Stage = void (FramePipeline::*)(const FlightPtr& flight, FrameResult result);
-
-  struct Account;
-
-  absl::Status Admit(const FrameJob& job, Flight& flight);
 
   // The stages in their order. Each hands the flight on, or over to Fail, and touches it no more.
   void BeginSearch(const FlightPtr& flight);
@@ -130,20 +119,13 @@ class FramePipeline {
   FrameEngine& engine_;
   const PipelineOptions options_;
   CostModel costs_;  // of the engine's device
-  // Held by the frames too, which may outlive the pipeline.
-  const std::shared_ptr<ByteBudget> frame_memory_;
-
-  mutable std::mutex mutex_;
-  std::condition_variable idle_;
-  uint32_t queued_ = 0;                                  // counts against the limit
-  std::unordered_map<std::string, uint32_t> queued_of_;  // by client; none at 0
-  uint32_t flights_ = 0;                                 // until `done` has returned
-  uint64_t accepted_ = 0;
-
-  WorkerPool workers_;
+  FrameAdmission admission_;
+  // For what takes no time to speak of, so that it never waits behind what does. What posts to
+  // another ends before it.
+  WorkerPool short_work_{1};
+  FairWorkers encoders_;
   // One thread: a measurement has all cores to itself, but for what renders and encodes meanwhile.
-  // Posts to the workers, so it ends before them.
-  FairWorker measurer_;
+  FairWorkers measurer_{1};
   Timer timer_;
   FrameQueue queue_;
 };

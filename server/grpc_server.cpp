@@ -62,6 +62,22 @@ void SetChannelArguments(grpc::ServerBuilder& builder, const ServerLimits& limit
   builder.SetResourceQuota(grpc::ResourceQuota("server").SetMaxThreads(kMaxReflectionThreads));
 }
 
+bool AllLocal(const std::vector<ListeningSocket>& sockets) {
+  return std::all_of(sockets.begin(), sockets.end(),
+                     [](const ListeningSocket& socket) { return socket.local(); });
+}
+
+void ServeChannelz(const std::vector<ListeningSocket>& sockets) {
+  for (const ListeningSocket& socket : sockets) {
+    if (!socket.local()) {
+      Log(LogLevel::kWarn, "insecure_channelz",
+          {{"address", socket.address()},
+           {"message", "others than this machine can see who is connected"}});
+    }
+  }
+  grpc::channelz::experimental::InitChannelzService();
+}
+
 }  // namespace
 
 struct GrpcServer::Parts {
@@ -84,15 +100,8 @@ absl::StatusOr<std::unique_ptr<GrpcServer>> GrpcServer::Start(std::vector<Listen
   google::protobuf::SetLogHandler(ForwardProtobufLog);
   grpc::EnableDefaultHealthCheckService(true);
   grpc::reflection::InitProtoReflectionServerBuilderPlugin();
-  if (options.channelz) {
-    for (const ListeningSocket& socket : sockets) {
-      if (!socket.local()) {
-        Log(LogLevel::kWarn, "insecure_channelz",
-            {{"address", socket.address()},
-             {"message", "others than this machine can see who is connected"}});
-      }
-    }
-    grpc::channelz::experimental::InitChannelzService();
+  if (options.channelz.value_or(!access.authenticates() && AllLocal(sockets))) {
+    ServeChannelz(sockets);
   }
   // Never shut down: that would join a thread which still polls connections that have written much,
   // for as long as 10 s after the last call (gRPC 1.51).

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -17,8 +18,9 @@ namespace halflight {
 
 struct GrpcServerOptions {
   // Whether to serve channelz, which tells everybody who can connect of calls, connections and
-  // their peers' addresses. Once in a process, for all servers from then on.
-  bool channelz = false;
+  // their peers' addresses. Unset: where there are no strangers, that is, only this machine can
+  // connect and nobody has to say who calls. Once in a process, for all servers from then on.
+  std::optional<bool> channelz;
 };
 
 class GrpcServer {

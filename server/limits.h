@@ -29,6 +29,7 @@ struct ServerLimits {
   uint32_t max_frame_seconds = 600;
   uint32_t max_stall_seconds = 60;
   uint32_t max_calls = 4096;
+  uint32_t max_client_calls = 3072;
   // Samples times particles: about a minute on two cores where particles overlap a few hundred
   // deep.
   uint64_t max_reference_work = 400'000'000'000;

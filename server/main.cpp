@@ -25,6 +25,7 @@
 #include "server/service_manager.h"
 #include "server/status_text.h"
 #include "server/supervision.h"
+#include "server/termination_watch.h"
 #include "server/version.h"
 
 namespace {
@@ -36,6 +37,9 @@ constexpr int kExitCannotStart = 1;
 constexpr int kExitBadFlags = 2;
 constexpr int kExitCutShort = 3;
 constexpr int kExitDeviceLost = 4;
+
+// How long destructors may take, once nothing is under way any more.
+constexpr std::chrono::seconds kPuttingAway{10};
 
 // How long what does not need a device that was lost may go on, such as telling clients of it.
 constexpr std::chrono::seconds kAfterDeviceLost{2};
@@ -56,9 +60,9 @@ int Fail(int code, const absl::Status& status) {
 
 PipelineOptions PipelineOptionsOf(const Options& options, const ServerLimits& limits,
                                   Metrics& metrics) {
-  PipelineOptions pipeline{.max_queued_frames = limits.max_queued_frames,
-                           .max_client_frames = limits.max_client_frames,
-                           .max_frame_bytes = limits.max_frame_bytes,
+  PipelineOptions pipeline{.admission = {.max_queued_frames = limits.max_queued_frames,
+                                         .max_client_frames = limits.max_client_frames,
+                                         .max_frame_bytes = limits.max_frame_bytes},
                            .encode_threads = options.encode_threads,
                            .warm_up = true,
                            .metrics = &metrics,
@@ -70,6 +74,10 @@ PipelineOptions PipelineOptionsOf(const Options& options, const ServerLimits& li
 }
 
 int Run(const Options& options, std::vector<ListeningSocket> inherited, const sigset_t& signals) {
+  // The last to go.
+  std::optional<TerminationWatch> watch(
+      std::in_place, signals, std::chrono::milliseconds::max(),
+      ImmediateEnd{EXIT_SUCCESS, "stopped", "told so while it was starting"});
   // What can be wrong with flags and files shows before the device is started.
   const auto access = Access::Load(options.access);
   if (!access.ok()) {
@@ -113,6 +121,7 @@ int Run(const Options& options, std::vector<ListeningSocket> inherited, const si
        {"tells_of_resets", device.tells_of_resets}});
 
   // Each uses those above it, and is gone before them.
+  PrometheusMetrics counted;
   ServerLimits limits = LimitsOnDevice(options.limits, device);
   limits.max_connections = std::min(limits.max_connections, RoomForConnections());
   if (limits.max_connections < options.limits.max_connections) {
@@ -134,7 +143,6 @@ int Run(const Options& options, std::vector<ListeningSocket> inherited, const si
   PartialUploads partial_uploads(upload_memory,
                                  {.max_count = limits.max_partial_uploads,
                                   .max_age = std::chrono::seconds(limits.partial_upload_seconds)});
-  PrometheusMetrics counted;
   Metrics& metrics = metrics_sockets->empty() ? Metrics::None() : counted;
   FramePipeline pipeline(**engine, PipelineOptionsOf(options, limits, metrics));
   const Backend backend{device, limits, version, store, partial_uploads, pipeline, metrics};
@@ -152,6 +160,7 @@ int Run(const Options& options, std::vector<ListeningSocket> inherited, const si
   }
   NotifyServiceManager("READY=1");
 
+  watch.reset();
   Supervision supervision(**server, **engine, backend, signals,
                           std::chrono::seconds(options.watchdog_seconds));
   const std::optional<int> signal = supervision.WaitForEnd();
@@ -169,6 +178,8 @@ int Run(const Options& options, std::vector<ListeningSocket> inherited, const si
     std::_Exit(kExitCutShort);
   }
   Log(LogLevel::kInfo, "stopped");
+  watch.emplace(signals, kPuttingAway,
+                ImmediateEnd{kExitCutShort, "cut_short", "stopped before all was put away"});
   return EXIT_SUCCESS;
 }
 

@@ -81,9 +81,16 @@ void AddObservabilityFlags(CLI::App& app, Options& options) {
   app.add_flag("--insecure-metrics", options.metrics.insecure,
                "Show metrics also where others than this machine can connect")
       ->group(group);
-  app.add_flag("--channelz", options.channelz,
-               "Serve grpc.channelz.v1, which tells everybody who can connect of calls, "
-               "connections and their peers' addresses")
+  app.add_option_function<std::string>(
+         "--channelz",
+         [&options](const std::string& serve) {
+           options.channelz = serve == "auto" ? std::nullopt : std::optional<bool>(serve == "on");
+         },
+         "Whether to serve grpc.channelz.v1, which tells everybody who can connect of calls, "
+         "connections and their peers' addresses: on, off, or auto: where only this machine can "
+         "connect and nobody has to say who calls")
+      ->check(CLI::IsMember({"auto", "on", "off"}))
+      ->default_str("auto")
       ->group(group);
 }
 
@@ -164,11 +171,15 @@ void AddLimitFlags(CLI::App& app, Options& options) {
   bytes("--max-frame-bytes", limits.max_frame_bytes,
         "Pixels and files of all frames from when they are accepted until they are sent");
   number("--max-frame-seconds", limits.max_frame_seconds,
-         "How long a frame may take once its rendering has begun; 0: no limit");
+         "How long a frame may take once its rendering has begun, without what it waits for other "
+         "frames meanwhile; 0: no limit");
   number("--max-stall-seconds", limits.max_stall_seconds,
          "How long a client may leave unread what is sent to it, or an upload unsent, before its "
          "call is ended; 0: for ever");
   number("--max-calls", limits.max_calls, "Calls under way");
+  number(
+      "--max-client-calls", limits.max_client_calls,
+      "Of these, those of one client: a tenant, or an address where nobody has to say who calls");
   bytes("--max-message-bytes", limits.max_message_bytes, "Largest message received");
   number("--max-connections", limits.max_connections,
          "Connections of all clients together; fewer where the limit on open files wants it");
@@ -248,6 +259,7 @@ absl::Status Check(const Options& options) {
   checks.InRange("--max-frame-seconds", limits.max_frame_seconds, {.low = 0.0, .high = 86400.0});
   checks.InRange("--max-stall-seconds", limits.max_stall_seconds, {.low = 0.0, .high = 86400.0});
   checks.InRange("--max-calls", limits.max_calls, {.low = 1.0, .high = 1e6});
+  checks.InRange("--max-client-calls", limits.max_client_calls, {.low = 1.0, .high = 1e6});
   if (limits.max_frame_bytes < limits.max_output_bytes) {
     checks.Reject("--max-frame-bytes", fmt::format("{}", limits.max_frame_bytes),
                   fmt::format("at least --max-output-bytes, {}", limits.max_output_bytes));

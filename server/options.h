@@ -28,8 +28,8 @@ struct Options {
   std::string log_level = "info";
   LogFormat log_format = LogFormat::kText;
   MetricsOptions metrics;
-  bool channelz = false;   // as in GrpcServerOptions
-  int encode_threads = 0;  // filled in: one for each core, less the one that renders
+  std::optional<bool> channelz;  // as in GrpcServerOptions
+  int encode_threads = 0;        // filled in: one for each core, less the one that renders
   int drain_seconds = 30;
   int watchdog_seconds = 60;              // 0: a device that hangs is not noticed
   std::shared_ptr<PlannedFaults> faults;  // null: none

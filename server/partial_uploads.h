@@ -9,6 +9,7 @@
 #include <list>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -32,6 +33,7 @@ struct PartialUpload {
   v1::ParticleSetDescription header;
   std::string tenant;  // "" where nothing says who it is
   ParticleAssembler assembler;
+  std::optional<NamedParticles> finished{};  // once all has arrived and finish was asked for
   ByteBudget::Share memory;
 };
 

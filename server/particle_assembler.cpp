@@ -57,13 +57,13 @@ absl::StatusOr<uint64_t> CheckedPayloadBytes(const v1::ParticleLayout& layout,
                                              const std::string& field, const ServerLimits& limits) {
   FieldChecks checks;
   uint32_t seen = 0;
-  for (int i = 0; i < layout.attributes_size(); ++i) {
+  for (int i = 0; i < layout.attributes_size() && checks.ok(); ++i) {
     const int attribute = layout.attributes(i);
     const std::string name = fmt::format("{}.attributes[{}]", field, i);
     if (FindFormat(attribute) == nullptr) {
       checks.Reject(name, fmt::format("{}", attribute),
                     "PARTICLE_ATTRIBUTE_POSITION (1) to PARTICLE_ATTRIBUTE_EMISSION (6)");
-      break;
+      continue;
     }
     const uint32_t bit = 1U << static_cast<uint32_t>(attribute);
     if ((seen & bit) != 0) {

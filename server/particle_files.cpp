@@ -313,7 +313,14 @@ std::shared_ptr<const ParticleSet> ParticleFiles::ReadFile(const std::string& sh
                                    O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK));
   absl::Status status;
   if (!file.ok()) {
-    status = SystemError(errno, "open");
+    const int error = errno;
+    status = SystemError(error, "open");
+    if (error == EMFILE || error == ENFILE || error == ENOMEM) {
+      // That says nothing of the file, which may well be read the next time.
+      Log(LogLevel::kWarn, "cache_dir_not_read",
+          {{"set", ToHex(sha256)}, {"message", MessageOf(status)}});
+      return nullptr;
+    }
   } else {
     auto set = ReadParticleFile(file.get(), sha256, limits_);
     if (set.ok()) {
@@ -374,7 +381,7 @@ void ParticleFiles::RemoveDownTo(uint64_t bytes) {
 
 bool ParticleFiles::idle() const {
   const std::lock_guard lock(mutex_);
-  return waiting_.empty();
+  return waiting_.empty() && readers_.empty();
 }
 
 uint64_t ParticleFiles::bytes() const {

@@ -127,8 +127,11 @@ absl::Status ParticleUpload::Finish(const v1::UploadFinish& finish) {
                       fmt::format("{}, as in the header", header.byte_size()));
   }
   if (finish.sha256() != header.sha256()) {
-    return FieldError("finish.sha256", ToHex(finish.sha256()),
-                      ToHex(header.sha256()) + ", as in the header");
+    const size_t bytes = finish.sha256().size();
+    return FieldError(
+        "finish.sha256",
+        bytes == kSha256Bytes ? ToHex(finish.sha256()) : fmt::format("{} bytes", bytes),
+        ToHex(header.sha256()) + ", as in the header");
   }
   if (at_ != header.byte_size()) {
     return FieldError("finish", fmt::format("after {} bytes", at_),
@@ -137,18 +140,21 @@ absl::Status ParticleUpload::Finish(const v1::UploadFinish& finish) {
   if (absl::Status room = store_.CheckRoom(header.byte_size()); !room.ok()) {
     return room;  // what has arrived is kept
   }
-  NamedParticles particles = upload_->assembler.Finish();
+  if (!upload_->finished.has_value()) {
+    upload_->finished = upload_->assembler.Finish();
+  }
+  const NamedParticles particles = *upload_->finished;
   if (particles.sha256 != header.sha256()) {
     return WithReason(
         absl::DataLossError(fmt::format("header.sha256: {}, but what arrived has {}",
                                         ToHex(header.sha256()), ToHex(particles.sha256))),
         v1::ERROR_REASON_CHECKSUM_MISMATCH);
   }
+  if (absl::Status inserted = store_.Insert(particles.sha256, particles.set); !inserted.ok()) {
+    return inserted;  // others were quicker; what has arrived is kept
+  }
   partial_.Drop(particles.sha256);
   upload_.reset();
-  if (absl::Status kept = store_.Insert(particles.sha256, std::move(particles.set)); !kept.ok()) {
-    return kept;  // others were quicker
-  }
   over_ = true;
   response_.emplace();
   return absl::OkStatus();

@@ -18,6 +18,8 @@ constexpr timespec kLook{.tv_sec = 0, .tv_nsec = 250'000'000};
 // How long no frame may come before memory goes back: longer than the pauses of somebody at work,
 // who would wait for it to be taken again.
 constexpr std::chrono::seconds kIdle(10);
+// So that a peak is not kept for ever by a few frames a minute.
+constexpr std::chrono::minutes kAtLeastEvery(5);
 // How often a drain looks whether it is over.
 constexpr timespec kDrainPoll{.tv_sec = 0, .tv_nsec = 20'000'000};
 
@@ -68,10 +70,13 @@ void Supervision::GiveMemoryBack() {
   backend_.partial_uploads.DropExpired();
   const uint64_t frames = backend_.pipeline.accepted();
   const uint64_t work = frames + server_.calls_begun();
-  if (backend_.pipeline.idle() && frames == frames_seen_ && work != given_back_) {
+  const bool rests = backend_.pipeline.idle() && frames == frames_seen_;
+  const auto now = Clock::now();
+  if (work != given_back_ && (rests || now - last_given_back_ >= kAtLeastEvery)) {
     BlockCache::Release();
     GiveBackFreedMemory();
     given_back_ = work;
+    last_given_back_ = now;
   }
   frames_seen_ = frames;
 }

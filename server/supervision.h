@@ -26,7 +26,7 @@ class Supervision {
 
   // The signal that ends the service; none where the device does, and that is logged. Meanwhile
   // tells the service manager that it is well, and gives memory back: of uploads that nobody
-  // resumes, and whenever frames have stopped coming.
+  // resumes, and of frames whenever they have stopped coming, or every few minutes.
   std::optional<int> WaitForEnd();
 
   // Turns newcomers away and waits for what is under way: calls, frames whose calls have gone, what
@@ -43,6 +43,7 @@ class Supervision {
   const std::chrono::seconds patience_;
   uint64_t frames_seen_ = 0;
   std::optional<uint64_t> given_back_;  // after so much work
+  std::chrono::steady_clock::time_point last_given_back_ = std::chrono::steady_clock::now();
 };
 
 }  // namespace halflight

@@ -4,7 +4,7 @@
 
 #include <fmt/format.h>
 
-#include "server/convert/convert_scene.h"
+#include "server/convert/scene_checks.h"
 
 namespace halflight {
 namespace {

@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 
 #include "halflight/sha256.h"
-#include "server/convert/convert_scene.h"
+#include "server/convert/convert_shadow.h"
 #include "server/convert/geometry.h"
 
 namespace halflight {

@@ -48,6 +48,17 @@ std::shared_ptr<const ParticleBounds> BoundsCache::Of(
   return {entry, &entry->bounds};
 }
 
+std::optional<BoundingSphere> BoundsCache::After(const std::shared_ptr<const ParticleSet>& set,
+                                                 double seconds) {
+  const std::shared_ptr<Entry> entry = EntryOf(set);
+  const std::lock_guard lock(entry->mutex);
+  if (entry->seconds != seconds) {
+    entry->after = Bounds(*set, 0.0F, seconds);
+    entry->seconds = seconds;
+  }
+  return entry->after;
+}
+
 size_t BoundsCache::size() const {
   const std::lock_guard lock(mutex_);
   return entries_.size();

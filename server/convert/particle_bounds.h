@@ -39,6 +39,11 @@ class BoundsCache {
   // Walks over the set where nobody has; who asks meanwhile waits for that.
   std::shared_ptr<const ParticleBounds> Of(const std::shared_ptr<const ParticleSet>& set);
 
+  // A sphere round all centres after a time, radii included where the set has them; without a walk
+  // where that time was asked for last.
+  std::optional<BoundingSphere> After(const std::shared_ptr<const ParticleSet>& set,
+                                      double seconds);
+
   // Sets that are remembered: those that live, and at most as many again and a few.
   [[nodiscard]] size_t size() const;
 
@@ -46,6 +51,9 @@ class BoundsCache {
   struct Entry {
     std::once_flag once;
     ParticleBounds bounds;
+    std::mutex mutex;  // of those below
+    std::optional<double> seconds;
+    std::optional<BoundingSphere> after;
   };
 
   std::shared_ptr<Entry> EntryOf(const std::shared_ptr<const ParticleSet>& set);

@@ -29,6 +29,7 @@ v1::GetServerInfoResponse GetServerInfo(const Backend& backend) {
   told.set_max_frame_seconds(limits.max_frame_seconds);
   told.set_max_stall_seconds(limits.max_stall_seconds);
   told.set_max_calls(limits.max_calls);
+  told.set_max_client_calls(limits.max_client_calls);
   told.set_max_partial_uploads(limits.max_partial_uploads);
   told.set_partial_upload_seconds(limits.partial_upload_seconds);
   told.set_max_cache_dir_bytes(limits.max_cache_dir_bytes);

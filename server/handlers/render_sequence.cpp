@@ -211,7 +211,7 @@ RenderSequenceHandler::Step RenderSequenceHandler::NextStep() {
     end_ = absl::OkStatus();
   }
   if (!end_.has_value() && draining_ && slots_.empty()) {
-    end_ = DrainingError();
+    End(DrainingError());
   }
   if (end_.has_value()) {
     if (writing_) {

@@ -6,6 +6,7 @@
 #include <memory>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <grpcpp/grpcpp.h>
@@ -102,8 +103,8 @@ class AccessTest : public ::testing::Test {
   ParticleStore store_{1 << 20};
   ByteBudget upload_memory_{1 << 20};
   PartialUploads partial_uploads_{upload_memory_, {}};
-  FramePipeline pipeline_{engine_,
-                          {.max_queued_frames = 8, .encode_threads = 2, .encode = EncodePlain}};
+  FramePipeline pipeline_{
+      engine_, {.admission = {.max_queued_frames = 8}, .encode_threads = 2, .encode = EncodePlain}};
   Backend backend_{engine_.device(), limits_, version_, store_, partial_uploads_, pipeline_};
   std::unique_ptr<Access> access_;
   std::unique_ptr<GrpcServer> server_;
@@ -129,6 +130,32 @@ TEST_F(AccessTest, TokensAreWantedOfEveryCallButHealthAndReflection) {
                       std::string("\x3a\x00", 2))
                   .status.ok());
   EXPECT_EQ(engine_.rendered(), 0);
+}
+
+// What is cancelled while its refusal is on its way ends once.
+TEST_F(AccessTest, RefusedCallsMayBeCancelledAtAnyMoment) {
+  Serve({.token_file = WriteTokens({"alice"})});
+  const auto stub = v1::RenderService::NewStub(NewChannel(address_));
+  for (int i = 0; i < 500; ++i) {
+    grpc::ClientContext sequence;
+    const auto stream = stub->RenderSequence(&sequence);
+    grpc::ClientContext frame;
+    const auto reader = stub->RenderFrame(&frame, MakeRequest());
+    grpc::ClientContext upload;
+    v1::UploadParticlesResponse response;
+    const auto writer = stub->UploadParticles(&upload, &response);
+    if (i % 5 > 0) {
+      std::this_thread::sleep_for(std::chrono::microseconds(40 * (i % 5)));
+    }
+    sequence.TryCancel();
+    frame.TryCancel();
+    upload.TryCancel();
+    EXPECT_FALSE(stream->Finish().ok());
+    EXPECT_FALSE(reader->Finish().ok());
+    EXPECT_FALSE(writer->Finish().ok());
+  }
+  EXPECT_TRUE(Ask({}, "alice's-token").ok());
+  EXPECT_TRUE(WaitFor([this] { return server_->idle(); }));
 }
 
 TEST_F(AccessTest, OneBearerTokenIsAllThatCounts) {
@@ -183,6 +210,33 @@ TEST_F(AccessTest, WhatBrokeOffOfAnUploadIsItsTenantsAlone) {
   };
   EXPECT_EQ(committed("bob"), 0U);
   EXPECT_EQ(committed("alice"), 600U);
+}
+
+TEST_F(AccessTest, TenantWithAllItsCallsUnderWayIsRefusedAndOthersAreNot) {
+  limits_.max_client_calls = 2;
+  Serve({.token_file = WriteTokens({"alice", "bob"})});
+  {
+    // Calls that go on for as long as their client likes.
+    const auto stub = v1::RenderService::NewStub(NewChannel(address_));
+    grpc::ClientContext contexts[2];
+    std::vector<std::unique_ptr<
+        grpc::ClientReaderWriter<v1::RenderSequenceRequest, v1::RenderSequenceResponse>>>
+        calls;
+    for (grpc::ClientContext& context : contexts) {
+      context.AddMetadata("authorization", "Bearer alice's-token");
+      calls.push_back(stub->RenderSequence(&context));
+    }
+    ASSERT_TRUE(WaitFor([this] { return server_->calls(Rpc::kRenderSequence) == 2; }));
+    const absl::Status refused = Ask({}, "alice's-token");
+    EXPECT_EQ(refused.code(), absl::StatusCode::kResourceExhausted);
+    EXPECT_THAT(std::string(refused.message()), HasSubstr("at most 2 of one client"));
+    EXPECT_TRUE(Ask({}, "bob's-token").ok());
+    for (const auto& call : calls) {
+      call->WritesDone();
+      EXPECT_TRUE(call->Finish().ok());
+    }
+  }
+  EXPECT_TRUE(WaitFor([this] { return Ask({}, "alice's-token").ok(); }));
 }
 
 TEST_F(AccessTest, ErrorsSayWhatIsWantedAndNoToken) {

@@ -1,7 +1,9 @@
 // Sockets handed over, and the word that the service is ready: the test is the service manager.
 
+#include <chrono>
 #include <csignal>
 #include <string>
+#include <thread>
 
 #include <fcntl.h>
 #include <sys/socket.h>
@@ -113,6 +115,29 @@ TEST_F(ServiceManager, HearsWhenTheServiceIsReadyAndWhenItStops) {
   EXPECT_EQ(notify.Next(), "READY=1");
   // Ready is when it answers.
   EXPECT_EQ(Health(NewChannel("unix:" + folder_ / "own")), kServing);
+  server.Signal(SIGTERM);
+  EXPECT_EQ(notify.Next(), "STOPPING=1");
+  EXPECT_EQ(server.Wait(), 0);
+}
+
+TEST_F(ServiceManager, HearsThatTheServiceLivesWhereItAsks) {
+  const NotifySocket notify(folder_ / "notify");
+  const Process server(
+      folder_, "halflightd_fake", {"--address", "unix:" + folder_ / "own"},
+      {.environment = {"NOTIFY_SOCKET=" + folder_ / "notify", "WATCHDOG_USEC=600000"}});
+  EXPECT_EQ(notify.Next(), "READY=1");
+  for (int beat = 0; beat < 3; ++beat) {
+    EXPECT_EQ(notify.Next(), "WATCHDOG=1") << beat;
+  }
+}
+
+TEST_F(ServiceManager, DoesNotHearItWhereItAsksAnother) {
+  const NotifySocket notify(folder_ / "notify");
+  Process server(folder_, "halflightd_fake", {"--address", "unix:" + folder_ / "own"},
+                 {.environment = {"NOTIFY_SOCKET=" + folder_ / "notify", "WATCHDOG_USEC=1000",
+                                  "WATCHDOG_PID=1"}});
+  EXPECT_EQ(notify.Next(), "READY=1");
+  std::this_thread::sleep_for(std::chrono::milliseconds(600));
   server.Signal(SIGTERM);
   EXPECT_EQ(notify.Next(), "STOPPING=1");
   EXPECT_EQ(server.Wait(), 0);

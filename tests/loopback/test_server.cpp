@@ -31,7 +31,8 @@ TestServer::TestServer(const ServerLimits& limits)
       store_(limits.max_cache_bytes),
       upload_memory_(limits.max_cache_bytes),
       partial_uploads_(upload_memory_, {.max_count = limits.max_partial_uploads}),
-      pipeline_(Engine(), {.max_queued_frames = limits.max_queued_frames, .encode_threads = 2}) {
+      pipeline_(Engine(), {.admission = {.max_queued_frames = limits.max_queued_frames},
+                           .encode_threads = 2}) {
   static std::atomic<int> sockets = 0;
   const std::string socket = "unix:" + ::testing::TempDir() + "halflight-loopback." +
                              std::to_string(getpid()) + "." + std::to_string(sockets++);

@@ -61,23 +61,41 @@ TEST(MetricsFlags, NoneAreShownUnlessAskedFor) {
   EXPECT_THAT(server.Err(), Not(HasSubstr(" metrics ")));
 }
 
-TEST(Channelz, IsServedWhenAskedFor) {
+grpc::StatusCode ChannelzCode(const std::string& address) {
+  return CallRaw(NewChannel(address), kGetServers, "").status.error_code();
+}
+
+TEST(Channelz, IsServedWhereThereAreNoStrangers) {
   const Folder folder;
-  const Process open(folder, "halflightd_fake", {"--address", "127.0.0.1:0", "--channelz"});
+  const Process open(folder, "halflightd_fake", {"--address", "127.0.0.1:0"});
   const testing::Answer answer = CallRaw(NewChannel(open.Address()), kGetServers, "");
   EXPECT_TRUE(answer.status.ok()) << answer.status.error_message();
   EXPECT_NE(answer.bytes, "") << "no server is listed";
-  const Process closed(folder, "halflightd_fake", {"--address", "127.0.0.1:0"});
-  EXPECT_EQ(CallRaw(NewChannel(closed.Address()), kGetServers, "").status.error_code(),
-            grpc::StatusCode::UNIMPLEMENTED);
+}
+
+TEST(Channelz, IsNotServedWhereOthersCouldAsk) {
+  const Folder folder;
+  const std::string tokens = folder.Write("tokens", std::string(64, '0') + " somebody\n");
+  for (const std::vector<std::string>& flags :
+       {std::vector<std::string>{"--address", "127.0.0.1:0", "--channelz", "off"},
+        {"--address", "127.0.0.1:0", "--token-file", tokens},
+        {"--address", "0.0.0.0:0", "--insecure-listen"}}) {
+    const Process closed(folder, "halflightd_fake", flags);
+    EXPECT_EQ(ChannelzCode(closed.Address()), grpc::StatusCode::UNIMPLEMENTED)
+        << flags.back() << ": " << closed.Err();
+  }
+  const Process asked(folder, "halflightd_fake",
+                      {"--address", "127.0.0.1:0", "--token-file", tokens, "--channelz", "on"});
+  EXPECT_EQ(ChannelzCode(asked.Address()), grpc::StatusCode::OK) << asked.Err();
 }
 
 TEST(Channelz, WhereOthersCanConnectIsToldLoudly) {
   const Folder folder;
   const Process server(folder, "halflightd_fake",
-                       {"--address", "0.0.0.0:0", "--insecure-listen", "--channelz"});
+                       {"--address", "0.0.0.0:0", "--insecure-listen", "--channelz", "on"});
   ASSERT_NE(server.Address(), "");
   EXPECT_THAT(server.Err(), HasSubstr("level=warning insecure_channelz address=0.0.0.0:"));
+  EXPECT_THAT(server.Err(), HasSubstr("level=warning insecure address=0.0.0.0:"));
 }
 
 }  // namespace

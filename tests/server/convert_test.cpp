@@ -10,7 +10,7 @@
 #include <glm/vec4.hpp>
 
 #include "server/convert/convert_frame.h"
-#include "server/convert/convert_scene.h"
+#include "server/convert/convert_shadow.h"
 #include "server/convert/describe.h"
 #include "server/convert/geometry.h"
 #include "tests/server/fake_engine.h"

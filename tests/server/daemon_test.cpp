@@ -92,7 +92,41 @@ TEST_F(Daemon, TimeToDrainIsBounded) {
   const auto stub = Connect(server.Address());
   std::jthread client([&] { EXPECT_FALSE(Render(*stub).ok()); });
   std::this_thread::sleep_for(std::chrono::milliseconds(300));
+  const auto begin = std::chrono::steady_clock::now();
   server.Signal(SIGINT);
+  EXPECT_EQ(server.Wait(), 3);
+  // Not the default's half a minute.
+  EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(20));
+}
+
+TEST_F(Daemon, SignalEndsItWhileTheDeviceHangsAtTheStart) {
+  std::ofstream(Path("hold.start")) << "";
+  Process server(folder_, "halflightd_fake",
+                 {"--address", "127.0.0.1:0", "--device", Path("hold")});
+  // It is starting: nothing tells so from outside but a little time.
+  std::this_thread::sleep_for(std::chrono::milliseconds(300));
+  server.Signal(SIGTERM);
+  EXPECT_EQ(server.Wait(), 0) << server.Err();
+}
+
+TEST_F(Daemon, SecondSignalEndsItWhileTheDeviceHangsAtTheEnd) {
+  std::ofstream(Path("hold.end")) << "";
+  Process server(folder_, "halflightd_fake",
+                 {"--address", "127.0.0.1:0", "--device", Path("hold")});
+  EXPECT_TRUE(Render(*Connect(server.Address())).ok());
+  server.Signal(SIGTERM);
+  ASSERT_TRUE(WaitFor([&] { return server.Err().find(" stopped") != std::string::npos; }));
+  server.Signal(SIGTERM);
+  EXPECT_EQ(server.Wait(), 3);
+  EXPECT_THAT(server.Err(), HasSubstr("stopped before all was put away"));
+}
+
+TEST_F(Daemon, TimeToPutAwayIsBounded) {
+  std::ofstream(Path("hold.end")) << "";
+  Process server(folder_, "halflightd_fake",
+                 {"--address", "127.0.0.1:0", "--device", Path("hold")});
+  ASSERT_NE(server.Address(), "");
+  server.Signal(SIGTERM);
   EXPECT_EQ(server.Wait(), 3);
 }
 

@@ -1,5 +1,6 @@
 // StartRenderThread for a halflightd without GL, under the real one's name. Frames wait for as long
-// as the file that --device names is there.
+// as the file that --device names is there; so does its start for one with ".start" added, and its
+// end for one with ".end".
 
 #include "renderer/render_thread.h"
 
@@ -14,9 +15,19 @@
 namespace halflight {
 namespace {
 
+void WaitWhileThere(const std::string& path) {
+  while (std::filesystem::exists(path)) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(2));
+  }
+}
+
 class FakeRenderThread : public FrameEngine {
  public:
   explicit FakeRenderThread(std::string hold) : hold_(std::move(hold)) {}
+
+  ~FakeRenderThread() override { WaitWhileThere(hold_ + ".end"); }
+  FakeRenderThread(const FakeRenderThread&) = delete;
+  FakeRenderThread& operator=(const FakeRenderThread&) = delete;
 
   absl::Status Submit(FrameRequest request, std::stop_token stop, Done done) override {
     return engine_.Submit(std::move(request), std::move(stop), std::move(done));
@@ -40,6 +51,7 @@ absl::StatusOr<std::unique_ptr<FrameEngine>> StartRenderThread(const RenderThrea
   if (options.device == "missing") {
     return absl::NotFoundError("--device: missing, allowed: what is there");
   }
+  WaitWhileThere(options.device + ".start");
   return std::make_unique<FakeRenderThread>(options.device);
 }
 

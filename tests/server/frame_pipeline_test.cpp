@@ -4,7 +4,9 @@
 
 #include <atomic>
 #include <future>
+#include <mutex>
 #include <thread>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -18,6 +20,7 @@ namespace halflight {
 namespace {
 
 using testing::BytesOf;
+using ::testing::ElementsAre;
 using testing::EncodePlain;
 using testing::FakeImage;
 using ::testing::HasSubstr;
@@ -105,7 +108,7 @@ TEST_F(Pipeline, EncodingErrorsNameTheOutput) {
 }
 
 TEST_F(Pipeline, RefusesWithAHintWhenFullAndTakesAgainAfterwards) {
-  Start({.max_queued_frames = 2, .encode = EncodePlain});
+  Start({.admission = {.max_queued_frames = 2}, .encode = EncodePlain});
   engine_.SetGate(false);
   auto first = Submit(MustConvert());
   auto second = Submit(MustConvert());
@@ -120,7 +123,7 @@ TEST_F(Pipeline, RefusesWithAHintWhenFullAndTakesAgainAfterwards) {
 
 TEST_F(Pipeline, FramesThatWaitForTheEncoderCountAsQueued) {
   std::promise<void> release;
-  Start({.max_queued_frames = 1,
+  Start({.admission = {.max_queued_frames = 1},
          .encode = [held = release.get_future().share()](
                        const SharedImage& image, ImageKind kind, LightQuantity quantity,
                        const EncodeSettings& settings, const ImageMetadata& metadata) {
@@ -135,7 +138,7 @@ TEST_F(Pipeline, FramesThatWaitForTheEncoderCountAsQueued) {
 }
 
 TEST_F(Pipeline, ClientBeyondItsShareIsRefusedAndOthersAreNot) {
-  Start({.max_queued_frames = 4, .max_client_frames = 2, .encode = EncodePlain});
+  Start({.admission = {.max_queued_frames = 4, .max_client_frames = 2}, .encode = EncodePlain});
   engine_.SetGate(false);
   FrameJob job = MustConvert();
   job.caller.tenant = "greedy";
@@ -157,7 +160,7 @@ TEST_F(Pipeline, ClientBeyondItsShareIsRefusedAndOthersAreNot) {
 
 TEST_F(Pipeline, MemoryOfAFrameIsHeldUntilItIsLetGo) {
   const FrameJob job = MustConvert();
-  Start({.max_frame_bytes = job.pixel_bytes * 3 / 2, .encode = EncodePlain});
+  Start({.admission = {.max_frame_bytes = job.pixel_bytes * 3 / 2}, .encode = EncodePlain});
   Result first = Submit(job).get();
   ASSERT_TRUE(first.ok());
   const Result refused = Submit(job).get();
@@ -169,7 +172,7 @@ TEST_F(Pipeline, MemoryOfAFrameIsHeldUntilItIsLetGo) {
 
 TEST_F(Pipeline, EncodedFrameCountsWithItsBytesAlone) {
   const FrameJob job = MustConvert();
-  Start({.max_frame_bytes = job.pixel_bytes * 3 / 2,
+  Start({.admission = {.max_frame_bytes = job.pixel_bytes * 3 / 2},
          .encode = [](const SharedImage&, ImageKind, LightQuantity, const EncodeSettings&,
                       const ImageMetadata&) -> absl::StatusOr<EncodedImage> {
            return EncodedImage{.bytes = SharedBytes(std::string("small")),
@@ -187,6 +190,7 @@ TEST_F(Pipeline, FrameThatTakesTooLongIsEndedAndSaidSo) {
   const Result late = Submit(MustConvert()).get();
   EXPECT_EQ(late.status().code(), absl::StatusCode::kDeadlineExceeded);
   EXPECT_EQ(DetailOf(late.status()).reason, v1::ERROR_REASON_FRAME_TIME_EXCEEDED);
+  EXPECT_EQ(DetailOf(late.status()).allowed, "at most 0.02 s");
   engine_.SetGate(true);
   EXPECT_TRUE(Submit(MustConvert()).get().ok());
 }
@@ -232,6 +236,84 @@ TEST_F(Pipeline, EncodingDoesNotHoldUpRendering) {
   EXPECT_TRUE(third.get().ok());
 }
 
+// Holds every encoding until the promise is kept, and notes whose it is by the frame's width.
+struct HeldEncoding {
+  std::promise<void> release;
+  std::mutex mutex;
+  std::vector<int> widths;
+
+  [[nodiscard]] auto Encode() {
+    return [this, held = release.get_future().share()](
+               const SharedImage& image, ImageKind kind, LightQuantity quantity,
+               const EncodeSettings& settings, const ImageMetadata& metadata) {
+      {
+        const std::lock_guard lock(mutex);
+        widths.push_back(image->width);
+      }
+      held.wait();
+      return EncodePlain(image, kind, quantity, settings, metadata);
+    };
+  }
+  [[nodiscard]] size_t begun() {
+    const std::lock_guard lock(mutex);
+    return widths.size();
+  }
+};
+
+FrameJob JobOf(const std::string& tenant, uint32_t width) {
+  v1::RenderFrameRequest request = MakeRequest();
+  request.mutable_scene()->mutable_camera()->set_width(width);
+  FrameJob job = MustConvert(request);
+  job.caller.tenant = tenant;
+  return job;
+}
+
+TEST_F(Pipeline, EncodingOfAnotherClientIsNotLast) {
+  HeldEncoding encoding;
+  Start({.encode_threads = 1, .encode = encoding.Encode()});
+  std::vector<std::future<Result>> frames;
+  for (const uint32_t width : {10U, 11U, 12U}) {
+    frames.push_back(Submit(JobOf("greedy", width)));
+  }
+  EXPECT_TRUE(WaitFor([&] { return engine_.rendered() == 3 && encoding.begun() == 1; }));
+  frames.push_back(Submit(JobOf("other", 20)));
+  EXPECT_TRUE(WaitFor([&] { return engine_.rendered() == 4; }));
+  encoding.release.set_value();
+  for (auto& frame : frames) {
+    EXPECT_TRUE(frame.get().ok());
+  }
+  EXPECT_THAT(encoding.widths, ElementsAre(10, 20, 11, 12));
+}
+
+TEST_F(Pipeline, CancelledWhileItWaitsForTheEncoderEndsAtOnceAndFreesItsPlace) {
+  HeldEncoding encoding;
+  Start({.admission = {.max_queued_frames = 2}, .encode_threads = 1, .encode = encoding.Encode()});
+  auto first = Submit(MustConvert());
+  std::stop_source stop;
+  auto second = Submit(MustConvert(), stop.get_token());
+  EXPECT_TRUE(WaitFor([&] { return engine_.rendered() == 2 && encoding.begun() == 1; }));
+  stop.request_stop();
+  EXPECT_EQ(second.get().status().code(), absl::StatusCode::kCancelled);
+  auto third = Submit(MustConvert());
+  encoding.release.set_value();
+  EXPECT_TRUE(first.get().ok());
+  EXPECT_TRUE(third.get().ok());
+}
+
+TEST_F(Pipeline, WaitingForTheEncoderDoesNotCountAgainstAFrame) {
+  HeldEncoding encoding;
+  Start({.max_frame_time = std::chrono::milliseconds(300),
+         .encode_threads = 1,
+         .encode = encoding.Encode()});
+  auto first = Submit(MustConvert());
+  EXPECT_TRUE(WaitFor([&] { return encoding.begun() == 1; }));
+  auto second = Submit(MustConvert());
+  std::this_thread::sleep_for(std::chrono::milliseconds(600));
+  encoding.release.set_value();
+  EXPECT_TRUE(second.get().ok());
+  first.wait();
+}
+
 TEST_F(Pipeline, CancelledFrameIsDroppedBeforeItIsRendered) {
   Start({.encode = EncodePlain});
   engine_.SetGate(false);
@@ -261,7 +343,7 @@ TEST_F(Pipeline, CancelledFrameIsNotEncoded) {
 }
 
 TEST_F(Pipeline, RefusalOfTheEngineLeavesRoomForTheNext) {
-  Start({.max_queued_frames = 1, .encode = EncodePlain});
+  Start({.admission = {.max_queued_frames = 1}, .encode = EncodePlain});
   engine_.RefuseWith(absl::ResourceExhaustedError("full"));
   const Result refused = Submit(MustConvert()).get();
   EXPECT_EQ(refused.status().code(), absl::StatusCode::kResourceExhausted);

@@ -339,7 +339,7 @@ TEST_F(Search, IsCancelledInItsMiddleAndLetsTheNextBegin) {
 
 TEST_F(Search, GoesOnThoughTheQueueIsFull) {
   std::atomic<int> measured = 0;
-  Start({.max_queued_frames = 1,
+  Start({.admission = {.max_queued_frames = 1},
          .encode = EncodePlain,
          .measure = [&](const Image&, const Scene&, const MeasureJob& job,
                         const std::stop_token&) -> absl::StatusOr<FrameError> {

@@ -114,8 +114,9 @@ class Handlers : public ::testing::Test {
   ParticleStore store_{1 << 20};
   ByteBudget upload_memory_{1 << 20};
   PartialUploads partial_uploads_{upload_memory_, {}};
-  FramePipeline pipeline_{engine_,
-                          {.max_queued_frames = 64, .encode_threads = 2, .encode = EncodePlain}};
+  FramePipeline pipeline_{
+      engine_,
+      {.admission = {.max_queued_frames = 64}, .encode_threads = 2, .encode = EncodePlain}};
   Backend backend_{engine_.device(), limits_, version_, store_, partial_uploads_, pipeline_};
 };
 

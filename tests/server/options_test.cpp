@@ -3,6 +3,7 @@
 #include "server/options.h"
 
 #include <algorithm>
+#include <fstream>
 #include <iterator>
 #include <map>
 #include <sstream>
@@ -160,6 +161,7 @@ TEST(Options, HelpNamesEveryFlagAndRunsNothing) {
                            "--max-frame-seconds",
                            "--max-stall-seconds",
                            "--max-calls",
+                           "--max-client-calls",
                            "--max-connections",
                            "--max-connection-streams",
                            "--max-handshake-seconds",
@@ -237,6 +239,21 @@ TEST_F(ConfigFile, SaysAllThatFlagsSayALineEach) {
   EXPECT_TRUE((*options)->access.insecure_listen);
   EXPECT_EQ((*options)->access.tls.certificate, "a b.pem");
   EXPECT_EQ((*options)->access.tls.key, "k.pem");
+}
+
+// What is to be started from, with its suggestions taken up.
+TEST_F(ConfigFile, OfTheDeploymentIsRight) {
+  std::ifstream shipped(HALFLIGHT_DEPLOY "/halflightd.conf");
+  std::string taken_up;
+  for (std::string line; std::getline(shipped, line);) {
+    const bool suggestion = line.rfind('#', 0) == 0 && line.find(" = ") != std::string::npos;
+    taken_up += line.substr(suggestion ? 1 : 0) + "\n";
+  }
+  const std::string path = Write(taken_up);
+  const auto options = Parse({"--config", path.c_str()});
+  ASSERT_TRUE(options.ok() && options->has_value()) << options.status();
+  EXPECT_EQ((*options)->metrics.address, "127.0.0.1:9464");
+  EXPECT_EQ((*options)->access.token_file, "/etc/halflight/tokens");
 }
 
 TEST_F(ConfigFile, GivesWayToFlags) {

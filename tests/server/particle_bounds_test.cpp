@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "server/convert/convert_scene.h"
+#include "server/convert/scene_checks.h"
 
 namespace halflight {
 namespace {
@@ -92,12 +93,15 @@ TEST(ConvertScene, WalksOverASetOnce) {
   const std::shared_ptr<ParticleSet> set = TwoParticles();
   EXPECT_TRUE(CheckLight(set, 10.0, 0.0).ok());
   EXPECT_TRUE(CheckLight(set, 100.0, 1.0).ok());
+  EXPECT_TRUE(CheckLight(set, 5.0, 2.0).ok()) << "near enough to be looked at closely";
   set->positions[1].x = 1000.0F;
   EXPECT_TRUE(CheckLight(set, 10.0, 0.0).ok());
   EXPECT_TRUE(CheckLight(set, 100.0, 1.0).ok());
+  EXPECT_TRUE(CheckLight(set, 5.0, 2.0).ok());
   const std::shared_ptr<ParticleSet> other = std::make_shared<ParticleSet>(*set);
   EXPECT_FALSE(CheckLight(other, 10.0, 0.0).ok()) << "what is known of another set";
   EXPECT_FALSE(CheckLight(other, 100.0, 1.0).ok());
+  EXPECT_FALSE(CheckLight(other, 5.0, 2.0).ok());
 }
 
 // Whatever is known before a walk, a light is refused exactly where it is not outside the sphere.

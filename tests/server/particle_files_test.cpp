@@ -10,6 +10,7 @@
 #include <thread>
 #include <vector>
 
+#include <sys/resource.h>
 #include <unistd.h>
 
 #include <gmock/gmock.h>
@@ -315,6 +316,19 @@ TEST_F(Files, ReadThatIsCancelledReadsNothingUnlessSomebodyElseWaits) {
   stop.request_stop();
   EXPECT_EQ(Read(*files, particles.sha256, stop.get_token()), nullptr);
   EXPECT_TRUE(files->Use(particles.sha256)) << "cancelled is not damaged";
+  ExpectSame(Read(*files, particles.sha256), particles);
+}
+
+TEST_F(Files, WantOfDescriptorsCostsNoSet) {
+  const auto files = Open();
+  const NamedParticles particles = SetOf(10);
+  Write(*files, particles);
+  rlimit limit{};
+  ASSERT_EQ(getrlimit(RLIMIT_NOFILE, &limit), 0);
+  const rlimit none{.rlim_cur = 3, .rlim_max = limit.rlim_max};
+  ASSERT_EQ(setrlimit(RLIMIT_NOFILE, &none), 0);
+  EXPECT_EQ(Read(*files, particles.sha256), nullptr);
+  ASSERT_EQ(setrlimit(RLIMIT_NOFILE, &limit), 0);
   ExpectSame(Read(*files, particles.sha256), particles);
 }
 

@@ -141,6 +141,11 @@ TEST_F(Upload, RefusesAFinishThatContradictsTheHeader) {
   EXPECT_THAT(
       std::string(Send({Header(header_), Chunk(particles_.payload()), Finish(other)}).message()),
       HasSubstr("finish.sha256: 7878"));
+  // What is no digest is not repeated, however long it is.
+  other.set_sha256(std::string(1 << 20, 'x'));
+  const absl::Status status = Send({Header(header_), Chunk(particles_.payload()), Finish(other)});
+  EXPECT_THAT(std::string(status.message()), HasSubstr("finish.sha256: 1048576 bytes"));
+  EXPECT_LT(status.message().size(), 300U);
 }
 
 TEST_F(Upload, BadValueIsRefusedAsSoonAsItArrives) {

@@ -94,8 +94,8 @@ class Service : public ::testing::Test {
   ParticleStore store_{8 << 20};
   ByteBudget upload_memory_{8 << 20};
   PartialUploads partial_uploads_{upload_memory_, {}};
-  FramePipeline pipeline_{engine_,
-                          {.max_queued_frames = 2, .encode_threads = 2, .encode = EncodePlain}};
+  FramePipeline pipeline_{
+      engine_, {.admission = {.max_queued_frames = 2}, .encode_threads = 2, .encode = EncodePlain}};
   Backend backend_{engine_.device(), limits_, version_, store_, partial_uploads_, pipeline_};
   std::unique_ptr<GrpcServer> server_;
   std::shared_ptr<grpc::Channel> channel_;

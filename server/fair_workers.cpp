@@ -1,16 +1,16 @@
-#include "server/fair_worker.h"
+#include "server/fair_workers.h"
 
 #include <utility>
 
 namespace halflight {
 
-void FairWorker::Post(FairTask task) {
+void FairWorkers::Post(FairTask task) {
   turns_.Wait({.client = std::move(task.client),
                .priority = task.priority,
                .stop = std::move(task.stop),
                .taken =
                    [this, run = std::move(task.run)](const FairTurns::Turn& turn) {
-                     thread_.Post([this, run, turn] {
+                     threads_.Post([this, run, turn] {
                        run();
                        turns_.End(turn, [] {});
                      });

@@ -1,4 +1,4 @@
-// One thread that works off tasks in turns that are fair between clients. Has no bound of its own:
+// Threads that work off tasks in turns that are fair between clients. Have no bound of their own:
 // whoever posts limits what is under way.
 #pragma once
 
@@ -19,19 +19,21 @@ struct FairTask {
   std::function<void()> cancelled{};  // instead, where `stop` is requested before its turn
 };
 
-class FairWorker {
+class FairWorkers {
  public:
+  explicit FairWorkers(int threads) : threads_(threads), turns_(threads) {}
+
   // Any thread, also from within a task; never waits for a task. `cancelled` is called at once, on
-  // the thread that requests the stop, and must only hand over. Before the worker is gone, one of
-  // the two was called and has returned.
+  // the thread that requests the stop, and must only hand over. Before the workers are gone, one
+  // of the two was called and has returned.
   void Post(FairTask task);
 
   // Tasks that wait. Any thread.
   [[nodiscard]] size_t waiting() const { return turns_.waiting(); }
 
  private:
-  WorkerPool thread_{1};
-  FairTurns turns_{1};  // its end waits for the last turn, so the thread outlives it
+  WorkerPool threads_;
+  FairTurns turns_;  // its end waits for the last turn, so the threads outlive it
 };
 
 }  // namespace halflight

@@ -1,5 +1,6 @@
-#include "server/fair_worker.h"
+#include "server/fair_workers.h"
 
+#include <barrier>
 #include <future>
 #include <optional>
 #include <vector>
@@ -40,7 +41,7 @@ class Worker : public ::testing::Test {
   std::promise<void> release_;
   std::vector<std::string> run_;
   std::vector<std::string> cancelled_;
-  std::optional<FairWorker> worker_{std::in_place};
+  std::optional<FairWorkers> worker_{std::in_place, 1};
 };
 
 TEST_F(Worker, TaskOfAnotherClientIsNotLast) {
@@ -83,6 +84,16 @@ TEST_F(Worker, TaskMayPostAnother) {
                  }});
   Finish();
   EXPECT_THAT(run_, ElementsAre("second"));
+}
+
+TEST_F(Worker, SeveralWorkAtOnce) {
+  constexpr int kThreads = 3;
+  worker_.emplace(kThreads);
+  std::barrier all(kThreads);  // nobody goes on before as many have come
+  for (int i = 0; i < kThreads; ++i) {
+    worker_->Post({.client = "a", .run = [&all] { all.arrive_and_wait(); }});
+  }
+  worker_.reset();
 }
 
 }  // namespace

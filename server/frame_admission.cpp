@@ -1,0 +1,74 @@
+#include "server/frame_admission.h"
+
+#include <fmt/format.h>
+
+#include "server/error_detail.h"
+
+namespace halflight {
+
+FrameAdmission::FrameAdmission(const AdmissionLimits& limits)
+    : limits_(limits), memory_(std::make_shared<ByteBudget>(limits.max_frame_bytes)) {}
+
+absl::StatusOr<std::shared_ptr<FrameAdmission::Memory>> FrameAdmission::Admit(
+    const std::string& client, uint64_t bytes) {
+  auto memory = std::make_shared<Memory>(memory_);
+  const std::lock_guard lock(mutex_);
+  if (queued_ >= limits_.max_queued_frames) {
+    return BusyError(v1::ERROR_REASON_QUEUE_FULL, fmt::format("{} frames are under way", queued_),
+                     fmt::format("at most {}", limits_.max_queued_frames));
+  }
+  const auto own = queued_of_.find(client);
+  if (own != queued_of_.end() && own->second >= limits_.max_client_frames) {
+    return BusyError(v1::ERROR_REASON_CLIENT_QUEUE_FULL,
+                     fmt::format("{} frames of this client are under way", own->second),
+                     fmt::format("at most {}", limits_.max_client_frames));
+  }
+  if (!memory->Grow(bytes)) {
+    return BusyError(v1::ERROR_REASON_FRAME_MEMORY_FULL,
+                     fmt::format("the frame takes up to {} bytes", bytes),
+                     fmt::format("{} for all frames, of which {} are left", limits_.max_frame_bytes,
+                                 memory_->left()));
+  }
+  ++queued_;
+  ++queued_of_[client];
+  ++under_way_;
+  ++accepted_;
+  return memory;
+}
+
+void FrameAdmission::OnEncoded(const std::string& client) {
+  const std::lock_guard lock(mutex_);
+  --queued_;
+  const auto own = queued_of_.find(client);
+  if (--own->second == 0) {
+    queued_of_.erase(own);
+  }
+}
+
+void FrameAdmission::OnEnded() {
+  const std::lock_guard lock(mutex_);
+  --under_way_;
+  ended_.notify_all();
+}
+
+void FrameAdmission::WaitUntilIdle() {
+  std::unique_lock lock(mutex_);
+  ended_.wait(lock, [this] { return under_way_ == 0; });
+}
+
+uint32_t FrameAdmission::queued() const {
+  const std::lock_guard lock(mutex_);
+  return queued_;
+}
+
+bool FrameAdmission::idle() const {
+  const std::lock_guard lock(mutex_);
+  return under_way_ == 0;
+}
+
+uint64_t FrameAdmission::accepted() const {
+  const std::lock_guard lock(mutex_);
+  return accepted_;
+}
+
+}  // namespace halflight

@@ -1,0 +1,72 @@
+// Which frames are let in: of the server's places and of its client's, and of the memory that
+// frames may take. Knows nothing of what becomes of them.
+#pragma once
+
+#include <condition_variable>
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <unordered_map>
+#include <utility>
+
+#include "absl/status/statusor.h"
+#include "server/byte_budget.h"
+
+namespace halflight {
+
+struct AdmissionLimits {
+  uint32_t max_queued_frames = 64;  // accepted and not yet encoded
+  uint32_t max_client_frames = 64;  // of these, of one client
+  // Of pixels, and once a frame is encoded of its files, until the frame is sent.
+  uint64_t max_frame_bytes = std::numeric_limits<uint64_t>::max();
+};
+
+// All calls: any thread.
+class FrameAdmission {
+ public:
+  // A frame's part of the memory that frames may take; may outlive the admission.
+  class Memory {
+   public:
+    explicit Memory(std::shared_ptr<ByteBudget> of) : budget_(std::move(of)), share_(*budget_) {}
+
+    [[nodiscard]] bool Grow(uint64_t bytes) { return share_.Grow(bytes); }
+    void ShrinkTo(uint64_t bytes) { share_.ShrinkTo(bytes); }
+
+   private:
+    const std::shared_ptr<ByteBudget> budget_;
+    ByteBudget::Share share_;
+  };
+
+  explicit FrameAdmission(const AdmissionLimits& limits);
+
+  // A frame that takes up to so much memory. ResourceExhausted with reason and retry hint.
+  absl::StatusOr<std::shared_ptr<Memory>> Admit(const std::string& client, uint64_t bytes);
+  // Once for each that was let in: it is encoded, or has failed, and leaves its place to another.
+  void OnEncoded(const std::string& client);
+  // Then once: nothing is done for it any more.
+  void OnEnded();
+  // Until every frame that was let in has ended.
+  void WaitUntilIdle();
+
+  // Places that are taken.
+  [[nodiscard]] uint32_t queued() const;
+  // Whether no frame is between Admit and OnEnded.
+  [[nodiscard]] bool idle() const;
+  // Frames that were ever let in.
+  [[nodiscard]] uint64_t accepted() const;
+  [[nodiscard]] uint64_t memory_bytes() const { return memory_->used(); }
+
+ private:
+  const AdmissionLimits limits_;
+  const std::shared_ptr<ByteBudget> memory_;
+  mutable std::mutex mutex_;
+  std::condition_variable ended_;
+  uint32_t queued_ = 0;
+  std::unordered_map<std::string, uint32_t> queued_of_;  // by client; none at 0
+  uint32_t under_way_ = 0;
+  uint64_t accepted_ = 0;
+};
+
+}  // namespace halflight
