@@ -76,7 +76,7 @@ PipelineOptions PipelineOptionsOf(const Options& options, const ServerLimits& li
 int Run(const Options& options, std::vector<ListeningSocket> inherited, const sigset_t& signals) {
   // The last to go.
   std::optional<TerminationWatch> watch(
-      std::in_place, signals, std::chrono::milliseconds::max(),
+      std::in_place, signals, std::nullopt,
       ImmediateEnd{EXIT_SUCCESS, "stopped", "told so while it was starting"});
   // What can be wrong with flags and files shows before the device is started.
   const auto access = Access::Load(options.access);
@@ -155,12 +155,12 @@ int Run(const Options& options, std::vector<ListeningSocket> inherited, const si
   if (!shown.ok()) {
     return Fail(kExitCannotStart, shown.status());
   }
+  watch.reset();  // from now on a signal is a drain's
   for (const std::string& address : (*server)->addresses()) {
     Log(LogLevel::kInfo, "listening", {{"address", address}});
   }
   NotifyServiceManager("READY=1");
 
-  watch.reset();
   Supervision supervision(**server, **engine, backend, signals,
                           std::chrono::seconds(options.watchdog_seconds));
   const std::optional<int> signal = supervision.WaitForEnd();

@@ -4,6 +4,7 @@
 
 #include <chrono>
 #include <csignal>
+#include <optional>
 #include <string>
 #include <thread>
 
@@ -18,8 +19,9 @@ struct ImmediateEnd {
 class TerminationWatch {
  public:
   // While it lives, one of `signals`, which are blocked, ends the process at once, without any
-  // destructor; so does the end of `most`.
-  TerminationWatch(const sigset_t& signals, std::chrono::milliseconds most, ImmediateEnd end);
+  // destructor; so does the end of `most`, where there is one.
+  TerminationWatch(const sigset_t& signals, std::optional<std::chrono::seconds> most,
+                   ImmediateEnd end);
 
  private:
   std::jthread thread_;

@@ -103,8 +103,7 @@ TEST_F(Daemon, SignalEndsItWhileTheDeviceHangsAtTheStart) {
   std::ofstream(Path("hold.start")) << "";
   Process server(folder_, "halflightd_fake",
                  {"--address", "127.0.0.1:0", "--device", Path("hold")});
-  // It is starting: nothing tells so from outside but a little time.
-  std::this_thread::sleep_for(std::chrono::milliseconds(300));
+  ASSERT_TRUE(WaitFor([&] { return fs::exists(Path("hold.starting")); }));
   server.Signal(SIGTERM);
   EXPECT_EQ(server.Wait(), 0) << server.Err();
 }

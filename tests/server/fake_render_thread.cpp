@@ -1,6 +1,6 @@
 // StartRenderThread for a halflightd without GL, under the real one's name. Frames wait for as long
-// as the file that --device names is there; so does its start for one with ".start" added, and its
-// end for one with ".end".
+// as the file that --device names is there; so does its start for one with ".start" added, which it
+// renames to ".starting" then, and its end for one with ".end".
 
 #include "renderer/render_thread.h"
 
@@ -51,7 +51,11 @@ absl::StatusOr<std::unique_ptr<FrameEngine>> StartRenderThread(const RenderThrea
   if (options.device == "missing") {
     return absl::NotFoundError("--device: missing, allowed: what is there");
   }
-  WaitWhileThere(options.device + ".start");
+  const std::string start = options.device + ".start";
+  if (std::filesystem::exists(start)) {
+    std::filesystem::rename(start, start + "ing");
+    WaitWhileThere(start + "ing");
+  }
   return std::make_unique<FakeRenderThread>(options.device);
 }
 
