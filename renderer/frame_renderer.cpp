@@ -3,6 +3,7 @@
 #include <epoxy/gl.h>
 
 #include <algorithm>
+#include <new>
 #include <thread>
 #include <utility>
 
@@ -64,7 +65,13 @@ absl::StatusOr<std::unique_ptr<FrameRenderer::Begun>> FrameRenderer::Begin(Frame
   SliceCompositor& compositor = frame->request.scene.shadow.compositor;
   compositor = CompositorFor(compositor, device().software);
   frame->stop = std::move(stop);
-  const absl::Status status = Record(*frame);
+  const absl::Status status = [&] {
+    try {
+      return Record(*frame);
+    } catch (const std::bad_alloc&) {
+      return absl::ResourceExhaustedError("there is not enough memory to render the frame");
+    }
+  }();
   // Whatever else went wrong comes of that.
   if (absl::Status reset = CheckReset(); !reset.ok()) return reset;
   if (!status.ok()) {

@@ -41,21 +41,30 @@ absl::Status OutcomeOf(const absl::Status& status, Cancellation by) {
 
 }  // namespace
 
-bool CallCount::Enter(const std::string& client, uint32_t most) {
+absl::Status CallCount::Enter(const std::string& client, const ServerLimits& limits) {
   const std::lock_guard lock(mutex_);
-  uint32_t& calls = active_of_client_[client];
-  if (calls >= most) {
-    return false;
+  if (entered_ >= limits.max_calls) {
+    return BusyError(v1::ERROR_REASON_TOO_MANY_CALLS,
+                     fmt::format("{} calls are under way", entered_),
+                     fmt::format("at most {}", limits.max_calls));
   }
-  ++calls;
-  return true;
+  const auto own = entered_of_.find(client);
+  if (own != entered_of_.end() && own->second >= limits.max_client_calls) {
+    return BusyError(v1::ERROR_REASON_TOO_MANY_CALLS,
+                     fmt::format("{} calls of this client are under way", own->second),
+                     fmt::format("at most {}", limits.max_client_calls));
+  }
+  ++entered_;
+  ++entered_of_[client];
+  return absl::OkStatus();
 }
 
 void CallCount::Leave(const std::string& client) {
   const std::lock_guard lock(mutex_);
-  const auto found = active_of_client_.find(client);
-  if (--found->second == 0) {
-    active_of_client_.erase(found);
+  --entered_;
+  const auto own = entered_of_.find(client);
+  if (--own->second == 0) {
+    entered_of_.erase(own);
   }
 }
 
@@ -69,15 +78,9 @@ CallToken::CallToken(Rpc rpc, CallCount& count, const Backend& backend, const Ac
   context.AddInitialMetadata(kRequestIdKey, caller_.call_id);
   ++count_.begun;
   ++count_.active_of[static_cast<size_t>(rpc)];
-  const int active = ++count_.active;
+  ++count_.active;
   if (count_.draining) {
     refusal_ = DrainingError();
-    return;
-  }
-  if (active > static_cast<int64_t>(backend.limits.max_calls)) {
-    refusal_ = BusyError(v1::ERROR_REASON_TOO_MANY_CALLS,
-                         fmt::format("{} calls are under way", active - 1),
-                         fmt::format("at most {}", backend.limits.max_calls));
     return;
   }
   auto tenant = access.TenantOf(context);
@@ -86,12 +89,8 @@ CallToken::CallToken(Rpc rpc, CallCount& count, const Backend& backend, const Ac
     return;
   }
   caller_.tenant = *std::move(tenant);
-  const uint32_t most = backend.limits.max_client_calls;
-  entered_ = count_.Enter(caller_.client(), most);
-  if (!entered_) {
-    refusal_ = BusyError(v1::ERROR_REASON_TOO_MANY_CALLS, "another call of this client",
-                         fmt::format("at most {} of one client", most));
-  }
+  refusal_ = count_.Enter(caller_.client(), backend.limits);
+  entered_ = refusal_.ok();
 }
 
 CallToken::~CallToken() {

@@ -28,13 +28,14 @@ struct CallCount {
   std::atomic<uint64_t> begun = 0;
   std::atomic<bool> draining = false;
 
-  // One more of a client's calls; false, and nothing changed, where it has as many as it may.
-  bool Enter(const std::string& client, uint32_t most);
+  // One more of a client's calls; or nothing changes, and the error says whose calls are too many.
+  absl::Status Enter(const std::string& client, const ServerLimits& limits);
   void Leave(const std::string& client);
 
  private:
   std::mutex mutex_;
-  std::unordered_map<std::string, uint32_t> active_of_client_;  // none at 0
+  uint32_t entered_ = 0;  // of those that are active: who is refused takes nobody's place
+  std::unordered_map<std::string, uint32_t> entered_of_;  // by client; none at 0
 };
 
 // Counted before draining is looked at, so that whoever drains and then sees no calls can be sure
@@ -79,7 +80,7 @@ class CallToken {
   grpc::CallbackServerContext& context_;
   const std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
   Caller caller_;
-  bool entered_ = false;  // among the client's calls
+  bool entered_ = false;
   absl::Status refusal_;
   std::atomic<uint64_t> received_ = 0;
   std::atomic<uint64_t> sent_ = 0;

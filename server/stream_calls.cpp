@@ -92,6 +92,8 @@ std::optional<Message> Parse(grpc::ByteBuffer bytes) {
   if (!grpc::SerializationTraits<Message>::Deserialize(&bytes, &message).ok()) {
     return std::nullopt;
   }
+  // A sequence keeps what it is sent, which is bounded by what is known.
+  message.DiscardUnknownFields();
   return message;
 }
 

@@ -40,7 +40,8 @@ struct LightFit {
 
 // What a fit is made with. Sums of a particle that lies across tiles wait for all of its tiles:
 // 2 * Terms(degree) floats an entry, at most 59 MiB at degree 4 with these limits; twice that for a
-// light of three colours. A bin of a particle shadow map is one run, however many it holds.
+// light of three colours. A bin of a particle shadow map that takes several runs is gone through
+// twice.
 inline constexpr RunLimits kLightRuns{.rects = 1U << 18U, .entries = 1U << 19U};
 
 // Whether particles see the light between layers: those of a particle shadow map.

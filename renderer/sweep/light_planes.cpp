@@ -32,7 +32,7 @@ struct Lines {
 
 // One pass of a kernel over one plane.
 void BlurOnce(const Lines& lines, std::vector<float> weights, float density,
-              std::vector<float>& depth, LightPlanes& planes) {
+              std::vector<float>& depth, LightPlanes& planes, const std::stop_token& stop) {
   BlurLineJob job;
   // What reaches out of the buffer from everywhere in it meets nothing there.
   const size_t inside =
@@ -56,6 +56,7 @@ void BlurOnce(const Lines& lines, std::vector<float> weights, float density,
   const size_t count = lines.rows ? size : pitch / kLineLanes;
   const size_t at_a_time = lines.rows ? kRows : kColumnVectors;
   RunOnCores((count + at_a_time - 1) / at_a_time, [&](size_t task) {
+    if (stop.stop_requested()) return;
     Block<float> scratch(static_cast<size_t>(BlurScratchFloats(job.vectors, job.radius, job.tap)));
     BlurLineJob line = job;
     line.scratch = scratch.data();
@@ -72,13 +73,13 @@ void BlurOnce(const Lines& lines, std::vector<float> weights, float density,
 }
 
 void BlurAlongAxis(bool rows, const glm::dvec3& variance, const glm::vec3& density,
-                   LightPlanes& planes) {
+                   LightPlanes& planes, const std::stop_token& stop) {
   for (size_t c = 0; c < planes.depth.size(); ++c) {
     const auto channel = static_cast<glm::length_t>(c);
     if (!(density[channel] > 0.0F)) continue;
     for (const BlurStep& step : BlurSteps(glm::dvec3(variance[channel]), planes.size)) {
       BlurOnce({rows, planes.size, static_cast<int>(step.stride)},
-               DiscreteGaussian(step.variance.x), density[channel], planes.depth[c], planes);
+               DiscreteGaussian(step.variance.x), density[channel], planes.depth[c], planes, stop);
     }
   }
 }
@@ -113,9 +114,10 @@ Image LightPlanes::TakeImage() && {
   return image;
 }
 
-void BlurPlanes(const BlurVariance& variance, const glm::vec3& density, LightPlanes& planes) {
-  BlurAlongAxis(/*rows=*/true, variance.x, density, planes);
-  BlurAlongAxis(/*rows=*/false, variance.y, density, planes);
+void BlurPlanes(const BlurVariance& variance, const glm::vec3& density, LightPlanes& planes,
+                const std::stop_token& stop) {
+  BlurAlongAxis(/*rows=*/true, variance.x, density, planes, stop);
+  BlurAlongAxis(/*rows=*/false, variance.y, density, planes, stop);
 }
 
 }  // namespace halflight::sweep

@@ -2,6 +2,7 @@
 // there.
 #pragma once
 
+#include <stop_token>
 #include <vector>
 
 #include <glm/vec3.hpp>
@@ -31,7 +32,9 @@ struct LightPlanes {
 
 // Spreads the light, or where the unscattered light is kept, what is scattered, as
 // shaders/blur.frag does; `density` is the light's shadow density, red alone for planes without
-// colours. A colour that nothing attenuates stays as it is. Uses all cores.
-void BlurPlanes(const BlurVariance& variance, const glm::vec3& density, LightPlanes& planes);
+// colours. A colour that nothing attenuates stays as it is. Uses all cores. Once `stop` says so the
+// planes are anything.
+void BlurPlanes(const BlurVariance& variance, const glm::vec3& density, LightPlanes& planes,
+                const std::stop_token& stop = {});
 
 }  // namespace halflight::sweep

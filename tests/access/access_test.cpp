@@ -229,7 +229,8 @@ TEST_F(AccessTest, TenantWithAllItsCallsUnderWayIsRefusedAndOthersAreNot) {
     ASSERT_TRUE(WaitFor([this] { return server_->calls(Rpc::kRenderSequence) == 2; }));
     const absl::Status refused = Ask({}, "alice's-token");
     EXPECT_EQ(refused.code(), absl::StatusCode::kResourceExhausted);
-    EXPECT_THAT(std::string(refused.message()), HasSubstr("at most 2 of one client"));
+    EXPECT_THAT(std::string(refused.message()),
+                HasSubstr("2 calls of this client are under way, allowed: at most 2"));
     EXPECT_TRUE(Ask({}, "bob's-token").ok());
     for (const auto& call : calls) {
       call->WritesDone();

@@ -113,5 +113,24 @@ TEST(Memory, OfAParticleIsWhatTheDocumentationSays) {
   EXPECT_LT(eye, 35.0);
 }
 
+// However many particles a bin of a particle shadow map holds, and however many tiles each of them
+// touches.
+TEST(Memory, OfABinIsBoundedByItsRuns) {
+  Scene scene = test::BallScene(4000, 64);
+  scene.material.radius = 3.0F;
+  scene.shadow.technique = ShadowTechniqueKind::kParticleShadowMap;
+  scene.shadow.slices = 1;
+  scene.shadow.light_buffer_size = 256;
+  scene.shadow.fit_degree = 4;
+  const ParticleView particles(scene);
+  const Traversal traversal = PlanLight(scene, particles, 0);
+  const auto peak_with = [&](const RunLimits& limits) {
+    return PeakOf([&] { EXPECT_TRUE(FitLight(scene, particles, traversal, {}, limits).ok()); });
+  };
+  const size_t whole = peak_with({.rects = 4000, .entries = 1U << 20U});
+  const size_t in_runs = peak_with({.rects = 4000, .entries = 2000});
+  EXPECT_LT(in_runs, whole / 2) << whole;
+}
+
 }  // namespace
 }  // namespace halflight::sweep

@@ -2,8 +2,11 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <memory>
+#include <stop_token>
+#include <thread>
 #include <vector>
 
 #include "renderer/sweep/compositor.h"
@@ -31,14 +34,44 @@ LightFit Fit(const Scene& scene, const RunLimits& limits) {
 }
 
 TEST(Runs, LeaveEveryBitOfAFit) {
-  const Scene scene = MakeScene();
-  const LightFit whole = Fit(scene, kLightRuns);
-  for (const RunLimits limits :
-       {RunLimits{1000, 1U << 20U}, RunLimits{3000, 500}, RunLimits{7, 9}}) {
-    const LightFit fit = Fit(scene, limits);
-    EXPECT_TRUE(fit.depth == whole.depth) << limits.rects;
-    EXPECT_TRUE(fit.optical_depth.pixels == whole.optical_depth.pixels) << limits.rects;
+  Scene scene = MakeScene();
+  Scene layered = scene;
+  layered.shadow.technique = ShadowTechniqueKind::kParticleShadowMap;
+  layered.shadow.slices = 3;
+  Scene spread = layered;
+  spread.material.scattering_spread = 0.2F;
+  Scene colored = spread;
+  colored.lights[0].shadow_density = {0.3F, 0.6F, 1.2F};
+  for (const Scene& tested : {scene, layered, spread, colored}) {
+    const LightFit whole = Fit(tested, kLightRuns);
+    for (const RunLimits limits :
+         {RunLimits{1000, 1U << 20U}, RunLimits{3000, 500}, RunLimits{7, 9}}) {
+      const LightFit fit = Fit(tested, limits);
+      EXPECT_TRUE(fit.depth == whole.depth) << limits.rects;
+      EXPECT_TRUE(fit.optical_depth.pixels == whole.optical_depth.pixels) << limits.rects;
+    }
   }
+}
+
+// Slabs that hold nothing are passed through all the same, where light spreads between them.
+TEST(Runs, EndSoonInManyEmptySlabs) {
+  Scene scene = MakeScene();
+  scene.shadow.technique = ShadowTechniqueKind::kParticleShadowMap;
+  scene.shadow.slices = 65536;
+  scene.shadow.light_buffer_size = 1024;
+  scene.shadow.blur_mode = BlurMode::kTexelsPerSlice;
+  scene.shadow.blur_texels = 64.0F;
+  const ParticleView particles(scene);
+  std::stop_source stop;
+  std::jthread stops([&stop] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(200));
+    stop.request_stop();
+  });
+  // Left alone it would take many minutes.
+  const auto begin = std::chrono::steady_clock::now();
+  EXPECT_TRUE(absl::IsCancelled(
+      FitLight(scene, particles, PlanLight(scene, particles, 0), stop.get_token()).status()));
+  EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(30));
 }
 
 Composite Draw(const Scene& scene, const LightFit& fit, const RunLimits& limits) {
