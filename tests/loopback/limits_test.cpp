@@ -17,12 +17,12 @@ namespace {
 using absl::StatusCode;
 using testing::WaitFor;
 
-// Seconds of work on any CPU, in thousands of short passes.
+// Minutes of work on any CPU, in thousands of short passes: who waits for its end waits in vain.
 v1::RenderFrameRequest LongRequest() {
   Scene scene = test::BallScene(30000, 512);
   scene.material.radius = 0.3F;
-  scene.shadow.slices = 30000;
-  scene.shadow.light_buffer_size = 1024;
+  scene.shadow.slices = 60000;
+  scene.shadow.light_buffer_size = 4096;
   scene.sampling.supersample = 4;
   return RequestOf(scene);
 }

@@ -29,7 +29,8 @@ class BrokenRenderThread : public FrameEngine {
     return engine_.Submit(
         std::move(request), stop,
         [this, stop, large, done = std::move(done)](absl::StatusOr<FrameResult> result) {
-          std::this_thread::sleep_for(std::chrono::milliseconds(3));
+          // Long enough for some to be cancelled while they are drawn.
+          std::this_thread::sleep_for(std::chrono::milliseconds(fault_ == "leaks" ? 12 : 3));
           if (fault_ == "deaf" && large) {
             std::this_thread::sleep_for(std::chrono::seconds(1));
           } else if (fault_ == "leaks") {

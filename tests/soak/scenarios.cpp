@@ -59,7 +59,7 @@ std::span<const Scenario> Scenarios() {
       Scenario{"overload",
                "Ten times as many frames asked for as can be drawn",
                "a queue without a bound",
-               {"refusals answered within, 99th"},
+               {"frames under overload of those", "refusals answered within, 99th"},
                RunOverload},
       Scenario{"restarts",
                "SIGTERM under load",
