@@ -136,6 +136,20 @@ TEST_F(RenderCommandTest, NamesTheFileOfAFrameThatTheServerRefused) {
   EXPECT_THAT(MessageOf(status), HasSubstr("a.11.csv: bad radius"));
 }
 
+TEST_F(RenderCommandTest, IsDoneWithTheLastFrameWhateverTheServerSendsThen) {
+  for (const char* name : {"a.1.csv", "a.2.csv"}) {
+    directory_.Write(name, kCloud);
+  }
+  options_.input = directory_ / "a.%d.csv";
+  options_.frames = {1, 2};
+  Output("f.%d.png");
+  service_.end_of_sequence = {grpc::StatusCode::INTERNAL, "late fault"};
+  EXPECT_EQ(ExitCodeOf(Run()), ExitCode::kOk);
+  service_.unasked_frame = 2;
+  EXPECT_EQ(ExitCodeOf(Run()), ExitCode::kOk);
+  EXPECT_EQ(Files(), 4U);
+}
+
 TEST_F(RenderCommandTest, TellsCausesApartByExitCode) {
   options_.input = directory_.Write("a.csv", kCloud);
   EXPECT_EQ(ExitCodeOf(Run()), ExitCode::kUsage);  // no output
