@@ -116,8 +116,7 @@ absl::Status RenderFrames(const RenderOptions& options, const RenderJob& job, Cl
     return taker.Take(index, frame);
   };
   absl::Status status = client.RenderSequence(job.frames.size(), source, sink);
-  if (status.ok() || ExitCodeOf(status) == ExitCode::kInput ||
-      taker.taken() == job.frames.size()) {
+  if (status.ok() || ExitCodeOf(status) == ExitCode::kInput || taker.taken() == job.frames.size()) {
     return status;
   }
   // The number that people know stands in for the stream's count.

@@ -2,11 +2,13 @@
 // codes.
 #include "client/cli/render_command.h"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <unistd.h>
 
 #include <fstream>
 #include <sstream>
+#include <thread>
 
 #include "client/cli/exit_code.h"
 #include "client/cli/file_writer.h"
@@ -171,6 +173,16 @@ TEST_F(RenderCommandTest, TellsCausesApartByExitCode) {
   EXPECT_EQ(ExitCodeOf(Run()), ExitCode::kInterrupted);
 }
 
+TEST_F(RenderCommandTest, TakesNoTimeoutForNoneButZero) {
+  service_.tamper = [](auto&) { std::this_thread::sleep_for(std::chrono::milliseconds(50)); };
+  options_.input = directory_.Write("a.csv", kCloud);
+  Output("a.png");
+  options_.connection.timeout_s = 0.0004;
+  EXPECT_EQ(ExitCodeOf(Run()), ExitCode::kServerUnavailable);
+  options_.connection.timeout_s = 0;
+  EXPECT_EQ(ExitCodeOf(Run()), ExitCode::kOk);
+}
+
 TEST_F(RenderCommandTest, AsksForTheFramesOfAPattern) {
   options_.input = directory_ / "a.%04d.csv";
   Output("a.png");
@@ -305,6 +317,14 @@ TEST(WriteFileWhole, ReplacesAFileAndLeavesNothingBeside) {
   EXPECT_TRUE(WriteFileWhole("/dev/null", "x").ok());
   EXPECT_FALSE(fs::is_regular_file("/dev/null"));
   EXPECT_THAT(MessageOf(WriteFileWhole(directory / "none/a", "x")), HasSubstr("none/a"));
+}
+
+TEST(WriteFileWhole, LeavesFilesAloneThatItHasNotMade) {
+  const TestDirectory directory;
+  const std::string other = directory.Write(fmt::format(".a.{}.0.tmp", getpid()), "another's");
+  ASSERT_TRUE(WriteFileWhole(directory / "a", "new").ok());
+  EXPECT_EQ(Contents(directory / "a"), "new");
+  EXPECT_EQ(Contents(other), "another's");
 }
 
 TEST(ProgressLine, ShowsFramesSpeedAndTimeLeft) {
