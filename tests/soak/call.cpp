@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "client/frame_reader.h"
-#include "halflight/v1/service.pb.h"
+#include "halflight/v1/service.grpc.pb.h"
 
 namespace halflight::soak {
 
