@@ -20,6 +20,8 @@ namespace {
 constexpr size_t kUploadChunkBytes = size_t{256} << 10;
 // Chunks are far smaller; headers grow with outputs and layers.
 constexpr int kMaxReceivedBytes = 64 << 20;
+// gRPC keeps deadlines in whole milliseconds of another clock.
+constexpr std::chrono::milliseconds kRounding{10};
 
 absl::Status CheckAddress(const std::string& address) {
   const bool is_unix = address.rfind("unix:", 0) == 0;
@@ -34,13 +36,7 @@ absl::Status CheckAddress(const std::string& address) {
       fmt::format("address is '{}'; allowed: host:port or unix:path", address));
 }
 
-}  // namespace
-
-absl::Status FromGrpc(const grpc::Status& status) {
-  return absl::Status(static_cast<absl::StatusCode>(status.error_code()), status.error_message());
-}
-
-std::optional<std::chrono::milliseconds> RetryHint(const grpc::ClientContext& context) {
+std::optional<std::chrono::milliseconds> HintOf(const grpc::ClientContext& context) {
   const auto& metadata = context.GetServerTrailingMetadata();
   const auto found = metadata.find("grpc-retry-pushback-ms");
   if (found == metadata.end()) {
@@ -48,6 +44,15 @@ std::optional<std::chrono::milliseconds> RetryHint(const grpc::ClientContext& co
   }
   const auto ms = ParseCount(std::string_view(found->second.data(), found->second.size()));
   return ms && *ms < 3600000 ? std::optional(std::chrono::milliseconds(*ms)) : std::nullopt;
+}
+
+}  // namespace
+
+absl::Status FromGrpc(const grpc::Status& status, const grpc::ClientContext& context) {
+  const auto code = status.error_code() == grpc::StatusCode::CANCELLED
+                        ? absl::StatusCode::kUnavailable
+                        : static_cast<absl::StatusCode>(status.error_code());
+  return WithRetryHint(absl::Status(code, status.error_message()), HintOf(context));
 }
 
 void SetMetadata(grpc::ClientContext& context, std::string_view route, const std::string& token) {
@@ -112,7 +117,9 @@ absl::Status Client::Impl::Try(std::string_view route, const std::stop_token& st
     if (stop.stop_requested() && !status.ok()) {
       return absl::CancelledError("interrupted");
     }
-    if (status.code() == absl::StatusCode::kDeadlineExceeded && has_deadline) {
+    // Before that it is the server's, whose message says more.
+    if (status.code() == absl::StatusCode::kDeadlineExceeded && has_deadline &&
+        Clock::now() + kRounding >= deadline) {
       return absl::DeadlineExceededError(
           fmt::format("timeout: {} s went by without an answer from {}; allowed: longer, or 0 for "
                       "no limit",
@@ -121,7 +128,7 @@ absl::Status Client::Impl::Try(std::string_view route, const std::stop_token& st
     if (!IsRetryable(status)) {
       return status;
     }
-    const auto wait = backoff.Next(RetryHint(context));
+    const auto wait = backoff.Next(RetryHint(status));
     if (tries >= options_.max_attempts || (has_deadline && Clock::now() + wait > deadline)) {
       return absl::Status(status.code(),
                           fmt::format("{}, after {} of {} tries: {}", address_, tries,
@@ -136,7 +143,7 @@ absl::Status Client::Impl::Try(std::string_view route, const std::stop_token& st
 absl::StatusOr<v1::GetServerInfoResponse> Client::Impl::GetServerInfo(const std::stop_token& stop) {
   v1::GetServerInfoResponse response;
   absl::Status status = Try("", stop, [&](grpc::ClientContext& context) {
-    return FromGrpc(stub_->GetServerInfo(&context, v1::GetServerInfoRequest(), &response));
+    return FromGrpc(stub_->GetServerInfo(&context, v1::GetServerInfoRequest(), &response), context);
   });
   if (!status.ok()) {
     return status;
@@ -150,7 +157,7 @@ absl::StatusOr<std::vector<std::string>> Client::Impl::FindMissing(
   request.mutable_sha256()->Add(sha256.begin(), sha256.end());
   v1::FindMissingParticlesResponse response;
   absl::Status status = Try(route, stop, [&](grpc::ClientContext& context) {
-    return FromGrpc(stub_->FindMissingParticles(&context, request, &response));
+    return FromGrpc(stub_->FindMissingParticles(&context, request, &response), context);
   });
   if (!status.ok()) {
     return status;
@@ -169,7 +176,7 @@ absl::StatusOr<v1::QueryUploadResponse> Client::Impl::QueryUpload(
   v1::QueryUploadRequest request;
   request.set_sha256(sha256);
   v1::QueryUploadResponse response;
-  absl::Status status = FromGrpc(stub_->QueryUpload(&query, request, &response));
+  absl::Status status = FromGrpc(stub_->QueryUpload(&query, request, &response), query);
   // A server from before uploads could be resumed tells after the header that it has the set.
   if (!status.ok() && status.code() != absl::StatusCode::kUnimplemented) {
     return status;
@@ -202,7 +209,7 @@ absl::Status Client::Impl::UploadFrom(uint64_t offset, grpc::ClientContext& cont
       writer->WritesDone();
     }
   }
-  return FromGrpc(writer->Finish());
+  return FromGrpc(writer->Finish(), context);
 }
 
 absl::Status Client::Impl::EnsureUploaded(const EncodedParticles& particles, std::string_view route,
@@ -244,7 +251,7 @@ absl::StatusOr<RenderedFrame> Client::Impl::RenderOnce(grpc::ClientContext& cont
     }
     switch (message.part_case()) {
       case v1::RenderFrameResponse::kHeader:
-        status = assembler.AddHeader(message.header());
+        status = assembler.AddHeader(message.header(), request.outputs(), options_.max_frame_bytes);
         break;
       case v1::RenderFrameResponse::kChunk:
         status = assembler.AddChunk(message.chunk(), incoming.chunk_data);
@@ -262,7 +269,7 @@ absl::StatusOr<RenderedFrame> Client::Impl::RenderOnce(grpc::ClientContext& cont
     reader->Finish();
     return status;
   }
-  status = FromGrpc(reader->Finish());
+  status = FromGrpc(reader->Finish(), context);
   if (!status.ok()) {
     return status;
   }

@@ -42,6 +42,8 @@ struct ClientOptions {
   int max_attempts = 6;
   // The first wait between tries; it doubles from one to the next.
   std::chrono::milliseconds first_backoff{100};
+  // The most that the outputs of one frame may come to, so that no server fills the memory.
+  uint64_t max_frame_bytes = uint64_t{16} << 30;
   // When requested, calls end with CANCELLED at once.
   std::stop_token stop;
   Security security;
@@ -66,9 +68,11 @@ using FrameSource = std::function<absl::StatusOr<SequenceFrame>(uint64_t index)>
 // Takes frame `index`; called on the caller's thread, in ascending order, once each.
 using FrameSink = std::function<absl::Status(uint64_t index, RenderedFrame frame)>;
 
-// May be used from several threads at once. Errors are those that service.proto lists, and
-// DATA_LOSS where what came does not fit together; UNAVAILABLE and RESOURCE_EXHAUSTED are returned
-// only after max_attempts.
+// May be used from several threads at once. Errors are those that service.proto lists, DATA_LOSS
+// where what came does not fit together or was not asked for, and OUT_OF_RANGE beyond
+// max_frame_bytes. UNAVAILABLE, which a call that the server cancels ends with too, and the
+// RESOURCE_EXHAUSTED that passes are returned only after max_attempts; CANCELLED only where stop
+// was requested.
 class Client {
  public:
   // `address` is host:port or unix:path; InvalidArgument for anything else, and for security that
@@ -103,8 +107,9 @@ class Client {
 
   // Renders `count` frames over one stream. At most `read_ahead` frames are sent beyond the one
   // that is awaited. A stream that breaks off for a reason worth a retry goes on where it stopped.
-  // An error of `source` is returned after all frames before it were taken; one of `sink` at once.
-  // Where the server refuses a frame the message starts with "frame N: ", N counted from 0.
+  // An error or exception of `source` is returned after all frames before it were taken; an error
+  // of `sink` at once. How the stream ends does not matter once all frames were taken. Where the
+  // server refuses a frame the message starts with "frame N: ", N counted from 0.
   absl::Status RenderSequence(uint64_t count, const FrameSource& source, const FrameSink& sink,
                               uint32_t read_ahead = 4);
 

@@ -1,4 +1,4 @@
-// What client.cpp and sequence.cpp share: the channel, and how a call is tried.
+// What client.cpp and sequence*.cpp share: the channel, and how a call is tried.
 // Not for users of the library.
 #pragma once
 
@@ -16,10 +16,10 @@ namespace halflight::client {
 
 using Clock = std::chrono::system_clock;  // what gRPC takes deadlines in
 
-absl::Status FromGrpc(const grpc::Status& status);
-
-// How long the server asks to wait, as gRPC's convention for retries has it.
-std::optional<std::chrono::milliseconds> RetryHint(const grpc::ClientContext& context);
+// How the call ended, with the time to wait that gRPC's convention for retries has in its trailing
+// metadata. CANCELLED becomes UNAVAILABLE: where the caller did not ask for it, the server or a
+// proxy has ended the call, such as one that stalled.
+absl::Status FromGrpc(const grpc::Status& status, const grpc::ClientContext& context);
 
 class Client::Impl {
  public:

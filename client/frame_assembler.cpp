@@ -15,11 +15,57 @@ namespace {
 // Reserved before the bytes arrive; what a header promises beyond it is believed as it comes.
 constexpr uint64_t kMostReserved = uint64_t{64} << 20;
 
+absl::Status CheckOutputs(const v1::FrameHeader& header,
+                          const google::protobuf::RepeatedPtrField<v1::Output>& requested) {
+  if (header.outputs_size() != requested.size()) {
+    return absl::DataLossError(fmt::format("the frame has {} outputs, expected {}",
+                                           header.outputs_size(), requested.size()));
+  }
+  for (int i = 0; i < requested.size(); ++i) {
+    const v1::Output& output = header.outputs(i).output();
+    const v1::Output& wanted = requested[i];
+    if (output.kind() != wanted.kind()) {
+      return absl::DataLossError(fmt::format("output {}: kind is {}, expected {}", i,
+                                             v1::OutputKind_Name(output.kind()),
+                                             v1::OutputKind_Name(wanted.kind())));
+    }
+    if (wanted.format() != v1::IMAGE_FORMAT_UNSPECIFIED && output.format() != wanted.format()) {
+      return absl::DataLossError(fmt::format("output {}: format is {}, expected {}", i,
+                                             v1::ImageFormat_Name(output.format()),
+                                             v1::ImageFormat_Name(wanted.format())));
+    }
+  }
+  return absl::OkStatus();
+}
+
+absl::Status CheckSize(const v1::FrameHeader& header, uint64_t max_frame_bytes) {
+  uint64_t left = max_frame_bytes;
+  for (int i = 0; i < header.outputs_size(); ++i) {
+    const uint64_t size = header.outputs(i).byte_size();
+    if (size > left) {
+      return absl::OutOfRangeError(
+          fmt::format("max_frame_bytes: output {} has {} bytes, after {} of those before it; "
+                      "allowed: {} in all",
+                      i, size, max_frame_bytes - left, max_frame_bytes));
+    }
+    left -= size;
+  }
+  return absl::OkStatus();
+}
+
 }  // namespace
 
-absl::Status FrameAssembler::AddHeader(const v1::FrameHeader& header) {
+absl::Status FrameAssembler::AddHeader(
+    const v1::FrameHeader& header, const google::protobuf::RepeatedPtrField<v1::Output>& requested,
+    uint64_t max_frame_bytes) {
   if (started_) {
     return absl::DataLossError("a second header came within one frame");
+  }
+  if (absl::Status status = CheckOutputs(header, requested); !status.ok()) {
+    return status;
+  }
+  if (absl::Status status = CheckSize(header, max_frame_bytes); !status.ok()) {
+    return status;
   }
   started_ = true;
   frame_.header = header;

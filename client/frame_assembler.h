@@ -2,6 +2,8 @@
 // sizes and checksums are checked. Knows nothing of how messages arrive.
 #pragma once
 
+#include <google/protobuf/repeated_field.h>
+
 #include <cstdint>
 #include <string>
 #include <string_view>
@@ -17,10 +19,14 @@ struct RenderedFrame {
   std::vector<std::string> outputs;  // encoded, in the order of header.outputs
 };
 
-// Takes the messages of one frame. Every error is DATA_LOSS and final.
+// Takes the messages of one frame. Every error is final, and DATA_LOSS but for one.
 class FrameAssembler {
  public:
-  absl::Status AddHeader(const v1::FrameHeader& header);
+  // The header of a frame that was to have the outputs `requested`. OUT_OF_RANGE where they come to
+  // more than `max_frame_bytes`.
+  absl::Status AddHeader(const v1::FrameHeader& header,
+                         const google::protobuf::RepeatedPtrField<v1::Output>& requested,
+                         uint64_t max_frame_bytes);
   // `chunk` without its data, which comes in pieces.
   absl::Status AddChunk(const v1::OutputChunk& chunk, const std::vector<std::string_view>& data);
   // Completes the frame.

@@ -3,12 +3,35 @@
 #include <algorithm>
 #include <condition_variable>
 #include <mutex>
+#include <string>
+
+#include "absl/strings/cord.h"
 
 namespace halflight::client {
 
+namespace {
+
+constexpr const char* kPayload = "halflight/retry-after-ms";
+
+}  // namespace
+
+absl::Status WithRetryHint(absl::Status status, std::optional<std::chrono::milliseconds> hint) {
+  if (hint) {
+    status.SetPayload(kPayload, absl::Cord(std::to_string(hint->count())));
+  }
+  return status;
+}
+
+std::optional<std::chrono::milliseconds> RetryHint(const absl::Status& status) {
+  const auto payload = status.GetPayload(kPayload);
+  return payload ? std::optional(
+                       std::chrono::milliseconds(std::stoll(static_cast<std::string>(*payload))))
+                 : std::nullopt;
+}
+
 bool IsRetryable(const absl::Status& status) {
   return status.code() == absl::StatusCode::kUnavailable ||
-         status.code() == absl::StatusCode::kResourceExhausted;
+         (status.code() == absl::StatusCode::kResourceExhausted && RetryHint(status));
 }
 
 Backoff::Backoff(std::chrono::milliseconds first, unsigned seed) : first_(first), random_(seed) {}

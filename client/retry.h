@@ -11,7 +11,12 @@
 
 namespace halflight::client {
 
-// The codes that service.proto says to retry: UNAVAILABLE and RESOURCE_EXHAUSTED.
+// The least time that the server asks to wait before another try, kept with its status.
+absl::Status WithRetryHint(absl::Status status, std::optional<std::chrono::milliseconds> hint);
+std::optional<std::chrono::milliseconds> RetryHint(const absl::Status& status);
+
+// UNAVAILABLE, and RESOURCE_EXHAUSTED with a hint: without one it is gRPC's own, of a message that
+// is too large, and will be so again.
 bool IsRetryable(const absl::Status& status);
 
 // Exponential backoff with full jitter in its upper half: the n-th wait lies between half of and

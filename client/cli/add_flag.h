@@ -73,6 +73,8 @@ inline constexpr Range kPositive{0, HUGE_VAL, "a number > 0", false, false};
 // Of fields that are 32-bit floats in the request.
 inline constexpr Range kNotNegative{0, kLargestFloat, "a number from 0 to 3e38"};
 inline constexpr Range kRadius{kSmallestRadius, kLargestLength, "a number from 1e-15 to 1e17"};
+// The largest below 1 that is so as a 32-bit float too, in decimal.
+inline constexpr double kBelowOne = 0.9999999;
 
 inline CLI::Option* AddNumber(CLI::App& app, const std::string& flag, std::optional<double>& target,
                               const Range& range, const std::string& help) {

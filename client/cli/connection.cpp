@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include <cmath>
+#include <chrono>
 #include <cstdlib>
 #include <string>
 #include <utility>
@@ -31,7 +31,8 @@ Connection::Connection(std::optional<LocalServer> server, Client client)
 absl::StatusOr<Connection> Connection::Open(const ConnectionOptions& options,
                                             const std::stop_token& stop) {
   ClientOptions client_options;
-  client_options.timeout = std::chrono::milliseconds{std::llround(options.timeout_s * 1000)};
+  client_options.timeout = std::chrono::ceil<std::chrono::milliseconds>(
+      std::chrono::duration<double>(options.timeout_s));  // down to 0 would be for ever
   client_options.stop = stop;
   if (!options.server.empty()) {
     client_options.security = options.security;

@@ -15,13 +15,20 @@ namespace {
 
 namespace fs = std::filesystem;
 
+// Of temporary files, tried before the directory is given up.
+constexpr int kMostNames = 1000;
+
 absl::Status Failed(const std::string& path, const char* what, const std::string& reason) {
   return absl::UnknownError(fmt::format("{}: cannot be {}: {}", path, what, reason));
 }
 
-// 0, or errno.
-int WriteTo(const std::string& path, int flags, std::string_view bytes) {
-  const int fd = open(path.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC | flags, 0666);
+// Negative: errno says why not.
+int Open(const std::string& path, int flags) {
+  return open(path.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC | flags, 0666);
+}
+
+// Writes and closes what Open gave: 0, or errno.
+int WriteTo(int fd, std::string_view bytes) {
   if (fd < 0) {
     return errno;
   }
@@ -68,19 +75,28 @@ absl::Status PrepareDirectoryOf(const std::string& path) {
 absl::Status WriteFileWhole(const std::string& path, std::string_view bytes) {
   std::error_code ignored;
   if (fs::exists(path, ignored) && !fs::is_regular_file(path, ignored)) {
-    const int error = WriteTo(path, O_TRUNC, bytes);
+    const int error = WriteTo(Open(path, O_TRUNC), bytes);
     return error == 0 ? absl::OkStatus() : Failed(path, "written", std::strerror(error));
   }
+  // Another process of the same number, on another machine, may write there too, or have left one.
   const fs::path target(path);
-  const std::string temporary =
-      (target.parent_path() / fmt::format(".{}.{}.tmp", target.filename().string(), getpid()))
-          .string();
-  int error = WriteTo(temporary, O_EXCL, bytes);
+  std::string temporary;
+  int fd = -1;
+  for (int i = 0; i < kMostNames && fd < 0 && (i == 0 || errno == EEXIST); ++i) {
+    temporary = (target.parent_path() /
+                 fmt::format(".{}.{}.{}.tmp", target.filename().string(), getpid(), i))
+                    .string();
+    fd = Open(temporary, O_EXCL);
+  }
+  const bool created = fd >= 0;
+  int error = WriteTo(fd, bytes);
   if (error == 0 && std::rename(temporary.c_str(), path.c_str()) != 0) {
     error = errno;
   }
   if (error != 0) {
-    unlink(temporary.c_str());
+    if (created) {
+      unlink(temporary.c_str());
+    }
     return Failed(path, "written", std::strerror(error));
   }
   return absl::OkStatus();

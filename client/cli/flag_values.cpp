@@ -79,6 +79,15 @@ absl::StatusOr<Vec3> ParseVector(std::string_view text) {
   return Vec3{numbers[0], numbers[1], numbers[2]};
 }
 
+absl::StatusOr<Vec3> ParsePlace(std::string_view text) {
+  auto place = ParseVector(text);
+  const auto is_near = [](double value) { return std::abs(value) <= kFarthestPlace; };
+  if (!place.ok() || !std::all_of(place->begin(), place->end(), is_near)) {
+    return Unexpected(text, "three numbers x,y,z, each from -1e18 to 1e18");
+  }
+  return place;
+}
+
 absl::StatusOr<Vec3> ParseColor(std::string_view text) {
   std::vector<double> numbers = Numbers(text);
   if (numbers.size() == 1) {
@@ -168,11 +177,12 @@ absl::StatusOr<LightFlag> ParseLight(std::string_view text) {
     return light;
   }
   const bool is_point = text.substr(0, kPoint.size()) == kPoint;
-  const auto value = ParseVector(is_point ? text.substr(kPoint.size()) : text);
+  const auto value = is_point ? ParsePlace(text.substr(kPoint.size())) : ParseVector(text);
   if (!value.ok() || (!is_point && *value == Vec3{})) {
-    return Unexpected(text,
-                      "x,y,z (the direction in which the light travels, not 0,0,0), point:x,y,z "
-                      "(where it is), camera (along the view), or none alone");
+    return Unexpected(
+        text,
+        "x,y,z (the direction in which the light travels, not 0,0,0), point:x,y,z "
+        "(where it is, each from -1e18 to 1e18), camera (along the view), or none alone");
   }
   light.kind = is_point ? LightFlag::Kind::kPoint : LightFlag::Kind::kDirection;
   light.value = *value;

@@ -15,8 +15,13 @@ namespace halflight::client {
 // What colours and other 32-bit floats of a request may be: in decimal, below the largest float.
 inline constexpr double kLargestFloat = 3e38;
 
+// How far from 0 eyes, targets and lights may be along an axis, as the service has it.
+inline constexpr double kFarthestPlace = 1e18;
+
 // "1,-2.5,3": finite numbers.
 absl::StatusOr<Vec3> ParseVector(std::string_view text);
+// The same, of a place.
+absl::StatusOr<Vec3> ParsePlace(std::string_view text);
 // "0.5" or "0.5,0.6,0.7": finite and >= 0.
 absl::StatusOr<Vec3> ParseColor(std::string_view text);
 // "640x480".

@@ -105,9 +105,9 @@ void AddOutputFlags(CLI::App& app, RenderOptions& options) {
 void AddCameraFlags(CLI::App& app, RenderOptions& options) {
   Add(app, "--size", options.size, ParseSize, "Size of the image; default: 640x480", "WxH");
   Add(app, "--crop", options.crop, ParseCrop, "Render only this part of the image", "X,Y,W,H");
-  Add(app, "--eye", options.eye, ParseVector,
+  Add(app, "--eye", options.eye, ParsePlace,
       "Where the camera is; default: a three-quarter view that shows all particles", "X,Y,Z");
-  Add(app, "--target", options.target, ParseVector,
+  Add(app, "--target", options.target, ParsePlace,
       "What the camera looks at; default: the middle of the particles", "X,Y,Z");
   Add(app, "--up", options.up, ParseVector, "What appears upward; default: 0,1,0", "X,Y,Z");
   auto* const fov = AddNumber(app, "--fov", options.fov_deg,
@@ -115,7 +115,8 @@ void AddCameraFlags(CLI::App& app, RenderOptions& options) {
                               "Vertical field of view in degrees; default: 40");
   app.add_flag("--ortho", options.ortho, "Parallel projection that shows all particles")
       ->excludes(fov);
-  AddNumber(app, "--ortho-height", options.ortho_height, kPositive,
+  AddNumber(app, "--ortho-height", options.ortho_height,
+            {kSmallestRadius, kFarthestPlace, "a number from 1e-15 to 1e18"},
             "Parallel projection of this height, world units")
       ->excludes(fov);
 }
@@ -157,12 +158,13 @@ void AddMaterialFlags(CLI::App& app, RenderOptions& options) {
   AddChoice<v1::Profile>(app, "--profile", options.profile,
                          {{"soft", v1::PROFILE_SOFT}, {"ball", v1::PROFILE_BALL}},
                          "How particles thin out towards their edge; default: soft");
-  AddNumber(app, "--phase-g", options.phase_g, {-1, 1, "a number > -1 and < 1", false, false},
+  AddNumber(app, "--phase-g", options.phase_g,
+            {-kBelowOne, kBelowOne, "a number from -0.9999999 to 0.9999999"},
             "Mean cosine of scattering; default: 0");
   auto* const spread = AddNumber(app, "--scattering", options.scattering_spread, kNotNegative,
                                  "Sideways spread of light a world unit; default: 0");
   AddNumber(app, "--scattering-g", options.scattering_g,
-            {0, 1, "a number >= 0 and < 1", true, false},
+            {0, kBelowOne, "a number from 0 to 0.9999999"},
             "Scatter light as a physical medium of this mean cosine does")
       ->excludes(spread);
   AddNumber(app, "--scattering-albedo", options.scattering_albedo, {0, 1, "a number from 0 to 1"},
@@ -212,7 +214,8 @@ void AddShadowFlags(CLI::App& app, RenderOptions& options) {
       AddCount(app, "--supersample", options.supersample, 1, 8, "N x N samples a pixel");
   AddCount(app, "--downsample", options.downsample, 1, 8, "One sample for N x N pixels")
       ->excludes(supersample);
-  AddNumber(app, "--time-offset", options.time_offset_s, {-1e9, 1e9, "seconds"},
+  AddNumber(app, "--time-offset", options.time_offset_s,
+            {-kLargestLength, kLargestLength, "seconds from -1e17 to 1e17"},
             "Move particles along their velocities by this many seconds");
 }
 

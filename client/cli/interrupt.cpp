@@ -9,6 +9,17 @@
 
 namespace halflight::client {
 
+namespace {
+
+// As nohup and the & of a shell leave it: being blocked, the signal comes all the same.
+bool IsIgnored(int signal) {
+  struct sigaction action {};
+  sigaction(signal, nullptr, &action);
+  return action.sa_handler == SIG_IGN;
+}
+
+}  // namespace
+
 InterruptWatch::InterruptWatch() {
   sigset_t signals;
   sigemptyset(&signals);
@@ -19,7 +30,7 @@ InterruptWatch::InterruptWatch() {
   thread_ = std::thread([this, signals] {
     int signal = 0;
     while (sigwait(&signals, &signal) == 0 && !over_) {
-      if (!source_.request_stop()) {
+      if (!IsIgnored(signal) && !source_.request_stop()) {
         _exit(static_cast<int>(ExitCode::kInterrupted));
       }
     }

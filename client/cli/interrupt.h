@@ -1,6 +1,6 @@
 // Turns SIGINT, SIGTERM and SIGHUP into a stop request, so that a command unwinds: calls are
-// cancelled, files removed, the server ended. A second signal ends the process at once.
-// Leaves out SIGPIPE, which gRPC ignores by itself.
+// cancelled, files removed, the server ended. A second signal ends the process at once. One that
+// the process was told to ignore does nothing. Leaves out SIGPIPE, which gRPC ignores by itself.
 #pragma once
 
 #include <atomic>

@@ -5,9 +5,11 @@
 
 #include <cerrno>
 #include <cstring>
+#include <filesystem>
 #include <fstream>
 #include <set>
 #include <sstream>
+#include <system_error>
 #include <utility>
 
 #include "client/cli/exit_code.h"
@@ -20,6 +22,8 @@
 namespace halflight::client {
 
 namespace {
+
+namespace fs = std::filesystem;
 
 absl::Status Usage(const std::string& message) {
   return WithExitCode(absl::InvalidArgumentError(message), ExitCode::kUsage);
@@ -98,14 +102,35 @@ std::vector<JobFrame> NameFrames(const RenderOptions& options) {
   return frames;
 }
 
-// No two outputs in one file, and every input there, before anything is rendered.
-absl::Status CheckFiles(const std::vector<JobFrame>& frames) {
-  std::set<std::string> paths;
+// One name for each file, however the path is written.
+std::string NameOf(const std::string& path) {
+  std::error_code error;
+  const fs::path name = fs::weakly_canonical(fs::absolute(path, error), error);
+  return error ? path : name.string();
+}
+
+// No two outputs in one file nor any in one that is read, and every input there, before anything is
+// rendered.
+absl::Status CheckFiles(const RenderOptions& options, const std::vector<JobFrame>& frames) {
+  std::set<std::string> read;
+  if (!options.scene_path.empty()) {
+    read.insert(NameOf(options.scene_path));
+  }
+  for (const JobFrame& frame : frames) {
+    if (!frame.input.empty()) {
+      read.insert(NameOf(frame.input));
+    }
+  }
+  std::set<std::string> written;
   std::string first_missing;
   size_t missing = 0;
   for (const JobFrame& frame : frames) {
     for (const std::string& path : frame.outputs) {
-      if (!paths.insert(path).second) {
+      const std::string name = NameOf(path);
+      if (read.count(name) != 0) {
+        return Usage(fmt::format("--output: '{}' is read too; allowed: another file", path));
+      }
+      if (!written.insert(name).second) {
         return Usage(fmt::format("--output: '{}' is written twice; allowed: once", path));
       }
     }
@@ -154,7 +179,7 @@ absl::StatusOr<RenderJob> PlanRender(const RenderOptions& options) {
   RenderJob job;
   job.request = *std::move(request);
   job.frames = NameFrames(options);
-  if (absl::Status status = CheckFiles(job.frames); !status.ok()) {
+  if (absl::Status status = CheckFiles(options, job.frames); !status.ok()) {
     return status;
   }
 

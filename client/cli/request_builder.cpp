@@ -54,10 +54,13 @@ absl::StatusOr<v1::ImageFormat> FormatOf(const std::string& path, const RenderOp
 
 // The flags' outputs replace the scene's; what the scene says of an output of the same kind stays.
 absl::Status ApplyOutputs(const RenderOptions& options, v1::RenderFrameRequest& request) {
-  const auto in_scene = std::move(*request.mutable_outputs());
-  request.clear_outputs();
+  const auto in_scene = request.outputs();
+  if (!options.outputs.empty()) {
+    request.clear_outputs();
+  }
   bool has_png = false;
   bool has_exr = false;
+  bool has_buffer = false;
   bool has_light = false;
   for (const OutputFlag& flag : options.outputs) {
     v1::Output& output = *request.add_outputs();
@@ -87,6 +90,7 @@ absl::Status ApplyOutputs(const RenderOptions& options, v1::RenderFrameRequest& 
     } else if (options.exr_compression) {
       output.set_compression(*options.exr_compression);
     }
+    has_buffer = has_buffer || is_buffer;
     has_light = has_light || is_of_light;
     has_exr = has_exr || IsExr(*format);
     has_png = has_png || (!IsExr(*format) && *format != v1::IMAGE_FORMAT_RAW_FLOAT);
@@ -100,13 +104,13 @@ absl::Status ApplyOutputs(const RenderOptions& options, v1::RenderFrameRequest& 
     const char* needs;
   };
   for (const Use& use :
-       {Use{options.png_bits.has_value(), has_png, "--bits", "an output that ends in .png"},
-        Use{options.exr_format.has_value(), has_exr, "--exr", "an output that ends in .exr"},
+       {Use{options.png_bits.has_value(), has_png, "--bits", "an --output that ends in .png"},
+        Use{options.exr_format.has_value(), has_exr, "--exr", "an --output that ends in .exr"},
         Use{options.exr_compression.has_value(), has_exr, "--exr-compression",
-            "an output that ends in .exr"},
-        Use{options.quantity.has_value(), has_light, "--quantity", "an output light or layers"},
+            "an --output that ends in .exr"},
+        Use{options.quantity.has_value(), has_buffer, "--quantity", "an --output light or layers"},
         Use{options.output_light.has_value(), has_light, "--output-light",
-            "an output transmittance, light or layers"}}) {
+            "an --output transmittance, light or layers"}}) {
     if (use.given && !use.used) {
       return absl::InvalidArgumentError(
           fmt::format("{}: is given; allowed: only with {}", use.flag, use.needs));
@@ -250,7 +254,7 @@ void ApplyMaterial(const RenderOptions& options, v1::Scene& scene) {
 void ApplyTarget(const RenderOptions& options, v1::RenderFrameRequest& request) {
   const bool has_settings = options.technique || options.slices || options.plain ||
                             options.spacing || options.compositor || options.light_buffer_size ||
-                            options.blur_mode || options.blur_texels;
+                            options.blur_mode || options.blur_texels || options.fit_degree;
   if (has_settings) {
     request.clear_target();
   }
@@ -322,10 +326,8 @@ absl::Status ApplyMeasurement(const RenderOptions& options, v1::RenderFrameReque
 }  // namespace
 
 absl::Status ApplyFlags(const RenderOptions& options, v1::RenderFrameRequest& request) {
-  if (!options.outputs.empty()) {
-    if (absl::Status status = ApplyOutputs(options, request); !status.ok()) {
-      return status;
-    }
+  if (absl::Status status = ApplyOutputs(options, request); !status.ok()) {
+    return status;
   }
   v1::Scene& scene = *request.mutable_scene();
   ApplyCamera(options, *scene.mutable_camera());

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "client/framing.h"
+#include "halflight/particle_payload.h"
 
 namespace halflight::client {
 
@@ -66,6 +67,20 @@ void ChooseOpacity(const std::vector<const Particles*>& clouds, v1::Scene& scene
     scene.mutable_material()->set_opacity(kDefaultOpacity);
     choices.push_back({"opacity", fmt::format("{:.6g}, the default", kDefaultOpacity)});
   }
+}
+
+// A cloud where the offset of time takes it, as far as framing is concerned.
+Particles Moved(const Particles& cloud, double seconds) {
+  Particles moved;
+  moved.origin = cloud.origin;
+  moved.positions = cloud.positions;
+  moved.radii = cloud.radii;
+  for (size_t i = 0; i < cloud.velocities.size(); ++i) {
+    const double position = moved.positions[i] + seconds * cloud.velocities[i];
+    // The server refuses what lies beyond.
+    moved.positions[i] = static_cast<float>(std::clamp(position, -kLargestLength, kLargestLength));
+  }
+  return moved;
 }
 
 // The view of a camera that has a matrix: rows are right, up and backward.
@@ -187,10 +202,18 @@ absl::Status FillInScene(const std::vector<const Particles*>& clouds,
     radius = ChooseRadius(clouds, scene, choices);
     ChooseOpacity(clouds, scene, choices);
   }
+  std::vector<Particles> moved;
+  std::vector<const Particles*> framed = clouds;
+  if (scene.time_offset_s() != 0) {
+    moved.reserve(clouds.size());
+    std::transform(clouds.begin(), clouds.end(), framed.begin(), [&](const Particles* cloud) {
+      return &moved.emplace_back(Moved(*cloud, scene.time_offset_s()));
+    });
+  }
   View view{};
   Vec3 up = {0, 1, 0};
   if (absl::Status status =
-          ChooseCamera(clouds, radius, *scene.mutable_camera(), choices, view, up);
+          ChooseCamera(framed, radius, *scene.mutable_camera(), choices, view, up);
       !status.ok()) {
     return status;
   }

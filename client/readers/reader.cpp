@@ -9,6 +9,8 @@
 #include <cstring>
 #include <filesystem>
 #include <memory>
+#include <new>
+#include <stdexcept>
 #include <utility>
 
 #include "absl/strings/ascii.h"
@@ -81,26 +83,39 @@ absl::Status InFile(const std::string& path, const absl::Status& status) {
   return absl::Status(status.code(), fmt::format("{}: {}", path, MessageOf(status)));
 }
 
-}  // namespace
-
-absl::StatusOr<Particles> ReadParticles(const std::string& path, std::string_view format) {
+absl::StatusOr<Particles> Parse(const std::string& path, std::string_view format) {
   const auto chosen = ChooseFormat(path, format);
   if (!chosen.ok()) {
-    return InFile(path, chosen.status());
+    return chosen.status();
   }
   const auto bytes = ReadBytes(path);
   if (!bytes.ok()) {
-    return InFile(path, bytes.status());
+    return bytes.status();
   }
   auto columns = (*chosen)->read(*bytes);
   if (!columns.ok()) {
-    return InFile(path, columns.status());
+    return columns.status();
   }
-  auto particles = ParticlesFromColumns(*std::move(columns));
-  if (!particles.ok()) {
-    return InFile(path, particles.status());
+  return ParticlesFromColumns(*std::move(columns));
+}
+
+// How the standard library tells that bytes do not fit into the memory.
+absl::Status TooLarge(const std::exception& error) {
+  return absl::ResourceExhaustedError(fmt::format("does not fit into memory ({})", error.what()));
+}
+
+}  // namespace
+
+absl::StatusOr<Particles> ReadParticles(const std::string& path, std::string_view format) {
+  absl::StatusOr<Particles> particles;
+  try {
+    particles = Parse(path, format);
+  } catch (const std::bad_alloc& error) {
+    particles = TooLarge(error);
+  } catch (const std::length_error& error) {
+    particles = TooLarge(error);
   }
-  return particles;
+  return particles.ok() ? std::move(particles) : InFile(path, particles.status());
 }
 
 std::string FormatNames() {

@@ -16,6 +16,7 @@ namespace halflight::client {
 //   NotFound, PermissionDenied  the file cannot be opened
 //   InvalidArgument             malformed, or a value that no particle can have
 //   DataLoss                    shorter than its header says
+//   ResourceExhausted           does not fit into memory
 absl::StatusOr<Particles> ReadParticles(const std::string& path, std::string_view format = "");
 
 // "ply, csv, npy, raw".

@@ -17,6 +17,7 @@ using absl::StatusCode;
 using testing::ElementsAre;
 
 const grpc::Status kUnavailable(grpc::StatusCode::UNAVAILABLE, "draining");
+const grpc::Status kCancelled(grpc::StatusCode::CANCELLED, "stalled");
 const grpc::Status kExhausted(grpc::StatusCode::RESOURCE_EXHAUSTED, "queue is full");
 
 EncodedParticles SomeParticles(float seed, size_t count = 100) {
@@ -31,6 +32,10 @@ v1::RenderFrameRequest SomeRequest(int outputs = 2) {
     request.add_outputs()->set_kind(v1::OUTPUT_KIND_BEAUTY);
   }
   return request;
+}
+
+v1::Output& OutputOf(v1::RenderSequenceResponse& message, int index) {
+  return *message.mutable_header()->mutable_outputs(index)->mutable_output();
 }
 
 class ClientTest : public testing::Test {
@@ -86,6 +91,28 @@ TEST_F(ClientTest, TriesAgainWhenTheServerIsBusy) {
   EXPECT_EQ(service_.Calls("QueryUpload"), 5) << "each try of an upload begins with one";
   EXPECT_EQ(service_.Calls("UploadParticles"), 3);
   EXPECT_EQ(service_.Calls("RenderFrame"), 3);
+}
+
+TEST_F(ClientTest, DoesNotRepeatWhatIsTooLargeForTheServer) {
+  service_.gives_hints = false;  // as gRPC itself, of a message beyond the bound
+  service_.FailNext("RenderFrame", {{grpc::StatusCode::RESOURCE_EXHAUSTED, "message too large"}});
+  const EncodedParticles particles = SomeParticles(1);
+  ExpectError(Connect().RenderFrame(SomeRequest(), &particles).status(),
+              StatusCode::kResourceExhausted, {"message too large"});
+  EXPECT_EQ(service_.Calls("RenderFrame"), 1);
+}
+
+// Such as its guard against peers that stall.
+TEST_F(ClientTest, TriesAgainWhatTheServerCancelled) {
+  service_.FailNext("RenderFrame", {kCancelled, kCancelled, grpc::Status::OK, kCancelled});
+  const EncodedParticles particles = SomeParticles(1);
+  Client client = Connect();
+  EXPECT_TRUE(client.RenderFrame(SomeRequest(), &particles).ok());
+  EXPECT_EQ(service_.Calls("RenderFrame"), 3);
+  ClientOptions options;
+  options.max_attempts = 1;
+  ExpectError(Connect(options).RenderFrame(SomeRequest(), &particles).status(),
+              StatusCode::kUnavailable, {"stalled"});
 }
 
 TEST_F(ClientTest, UploadGoesOnWhereItBrokeOff) {
@@ -204,15 +231,42 @@ TEST_F(ClientTest, DetectsDamagedOutputs) {
                 [](auto& m) {
                   if (m.has_header()) m.clear_header();
                 }},
+           Case{"the frame has 1 outputs, expected 2",
+                [](auto& m) {
+                  if (m.has_header()) m.mutable_header()->mutable_outputs()->RemoveLast();
+                }},
+           Case{"kind is OUTPUT_KIND_DEPTH, expected OUTPUT_KIND_BEAUTY",
+                [](auto& m) {
+                  if (m.has_header()) OutputOf(m, 1).set_kind(v1::OUTPUT_KIND_DEPTH);
+                }},
+           Case{"format is IMAGE_FORMAT_PNG16, expected IMAGE_FORMAT_PNG8",
+                [](auto& m) {
+                  if (m.has_header()) OutputOf(m, 0).set_format(v1::IMAGE_FORMAT_PNG16);
+                }},
            Case{"1 checksums, expected 2",
                 [](auto& m) {
                   if (m.has_trailer()) m.mutable_trailer()->mutable_output_crc32c()->RemoveLast();
                 }},
        }) {
     service_.tamper = damage.tamper;
-    ExpectError(client.RenderFrame(SomeRequest(), &particles).status(), StatusCode::kDataLoss,
+    v1::RenderFrameRequest request = SomeRequest();
+    request.mutable_outputs(0)->set_format(v1::IMAGE_FORMAT_PNG8);
+    ExpectError(client.RenderFrame(request, &particles).status(), StatusCode::kDataLoss,
                 {damage.message});
   }
+}
+
+TEST_F(ClientTest, TakesNoMoreBytesThanItsOptionAllows) {
+  const EncodedParticles particles = SomeParticles(1);
+  ClientOptions options;
+  options.max_frame_bytes = 2 * 400033;  // each output has 32 + 1 + 400000
+  Client client = Connect(options);
+  EXPECT_TRUE(client.RenderFrame(SomeRequest(), &particles).ok());
+  service_.tamper = [](auto& m) {
+    if (m.has_header()) m.mutable_header()->mutable_outputs(1)->set_byte_size(UINT64_MAX);
+  };
+  ExpectError(client.RenderFrame(SomeRequest(), &particles).status(), StatusCode::kOutOfRange,
+              {"max_frame_bytes", "18446744073709551615", "allowed: 800066"});
 }
 
 TEST(Client, ConnectsAgainToAServerThatComesLate) {
@@ -243,13 +297,20 @@ TEST_F(ClientTest, EndsAtItsDeadline) {
 }
 
 TEST_F(ClientTest, SaysWhichTimeWasTooShort) {
-  service_.FailNext("GetServerInfo", {{grpc::StatusCode::DEADLINE_EXCEEDED, "Deadline Exceeded"}});
+  service_.tamper = [](auto&) { std::this_thread::sleep_for(std::chrono::milliseconds(500)); };
+  const EncodedParticles particles = SomeParticles(1);
+  ASSERT_TRUE(Connect().EnsureUploaded(particles).ok());
   ClientOptions options;
-  options.timeout = std::chrono::milliseconds(5000);
-  const absl::Status status = Connect(options).GetServerInfo().status();
-  EXPECT_EQ(status.code(), absl::StatusCode::kDeadlineExceeded);
-  EXPECT_THAT(MessageOf(status), testing::HasSubstr("timeout: 5 s"));
-  EXPECT_THAT(MessageOf(status), testing::HasSubstr(service_.address()));
+  options.timeout = std::chrono::milliseconds(250);
+  ExpectError(Connect(options).RenderFrame(SomeRequest(0), &particles).status(),
+              StatusCode::kDeadlineExceeded, {"timeout: 0.25 s", service_.address()});
+}
+
+TEST_F(ClientTest, LeavesTheServersOwnLimitOnTimeInItsWords) {
+  service_.FailNext("GetServerInfo", {{grpc::StatusCode::DEADLINE_EXCEEDED, "frame: 31 s"}});
+  const absl::Status status = Connect().GetServerInfo().status();
+  EXPECT_EQ(status.code(), StatusCode::kDeadlineExceeded);
+  EXPECT_EQ(MessageOf(status), "frame: 31 s");
 }
 
 TEST_F(ClientTest, EndsWhenStopped) {

@@ -10,6 +10,7 @@
 #include <map>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <set>
 #include <string>
 #include <vector>
@@ -57,8 +58,16 @@ class FakeService final : public v1::RenderService::Service {
   }
   // May change a message of a frame before it is sent.
   std::function<void(v1::RenderSequenceResponse& message)> tamper;
-  // Called with each request of a sequence before it is answered.
+  // Called with each request of a sequence as it came.
+  std::function<void(const v1::RenderFrameRequest& request)> on_request;
+  // Called with the index of each request of a sequence before it is answered.
   std::function<grpc::Status(uint64_t index)> before_frame;
+  // Whether a RESOURCE_EXHAUSTED of FailNext says when to come again.
+  bool gives_hints = true;
+  // Before this request of a sequence is read, a frame without outputs is sent all the same.
+  std::optional<uint64_t> unasked_frame;
+  // Of sequences whose frames were all sent.
+  grpc::Status end_of_sequence;
   int evict_after_upload = 0;       // so many sets are dropped as soon as they are complete
   std::vector<std::string> routes;  // metadata of renders, in hexadecimal
 
@@ -70,17 +79,17 @@ class FakeService final : public v1::RenderService::Service {
     return bytes;
   }
 
-  grpc::Status GetServerInfo(grpc::ServerContext* /*context*/,
+  grpc::Status GetServerInfo(grpc::ServerContext* context,
                              const v1::GetServerInfoRequest* /*request*/,
                              v1::GetServerInfoResponse* response) override {
     response->set_server_version("fake");
-    return Enter("GetServerInfo");
+    return Enter("GetServerInfo", *context);
   }
 
-  grpc::Status FindMissingParticles(grpc::ServerContext* /*context*/,
+  grpc::Status FindMissingParticles(grpc::ServerContext* context,
                                     const v1::FindMissingParticlesRequest* request,
                                     v1::FindMissingParticlesResponse* response) override {
-    if (grpc::Status status = Enter("FindMissingParticles"); !status.ok()) {
+    if (grpc::Status status = Enter("FindMissingParticles", *context); !status.ok()) {
       return status;
     }
     const std::lock_guard lock(mutex_);
@@ -92,9 +101,9 @@ class FakeService final : public v1::RenderService::Service {
     return grpc::Status::OK;
   }
 
-  grpc::Status QueryUpload(grpc::ServerContext* /*context*/, const v1::QueryUploadRequest* request,
+  grpc::Status QueryUpload(grpc::ServerContext* context, const v1::QueryUploadRequest* request,
                            v1::QueryUploadResponse* response) override {
-    if (grpc::Status status = Enter("QueryUpload"); !status.ok()) {
+    if (grpc::Status status = Enter("QueryUpload", *context); !status.ok()) {
       return status;
     }
     const std::lock_guard lock(mutex_);
@@ -103,10 +112,10 @@ class FakeService final : public v1::RenderService::Service {
     return grpc::Status::OK;
   }
 
-  grpc::Status UploadParticles(grpc::ServerContext* /*context*/,
+  grpc::Status UploadParticles(grpc::ServerContext* context,
                                grpc::ServerReader<v1::UploadParticlesRequest>* reader,
                                v1::UploadParticlesResponse* /*response*/) override {
-    if (grpc::Status status = Enter("UploadParticles"); !status.ok()) {
+    if (grpc::Status status = Enter("UploadParticles", *context); !status.ok()) {
       return status;
     }
     v1::UploadParticlesRequest message;
@@ -156,7 +165,7 @@ class FakeService final : public v1::RenderService::Service {
 
   grpc::Status RenderFrame(grpc::ServerContext* context, const v1::RenderFrameRequest* request,
                            grpc::ServerWriter<v1::RenderFrameResponse>* writer) override {
-    if (grpc::Status status = Enter("RenderFrame"); !status.ok()) {
+    if (grpc::Status status = Enter("RenderFrame", *context); !status.ok()) {
       return status;
     }
     NoteRoute(*context);
@@ -177,28 +186,45 @@ class FakeService final : public v1::RenderService::Service {
       grpc::ServerContext* context,
       grpc::ServerReaderWriter<v1::RenderSequenceResponse, v1::RenderSequenceRequest>* stream)
       override {
-    if (grpc::Status status = Enter("RenderSequence"); !status.ok()) {
+    if (grpc::Status status = Enter("RenderSequence", *context); !status.ok()) {
       return status;
     }
     NoteRoute(*context);
     v1::RenderSequenceRequest request;
-    for (uint64_t index = 0; stream->Read(&request); ++index) {
+    v1::RenderFrameRequest before;
+    for (uint64_t index = 0;; ++index) {
+      if (index == unasked_frame) {
+        SendEmptyFrame(index, *stream);
+      }
+      if (!stream->Read(&request)) {
+        return end_of_sequence;
+      }
+      v1::RenderFrameRequest& frame = *request.mutable_frame();
+      if (on_request) {
+        on_request(frame);
+      }
+      if (frame.outputs().empty()) {
+        *frame.mutable_outputs() = before.outputs();
+      }
+      if (frame.scene().particle_sha256().empty()) {
+        frame.mutable_scene()->set_particle_sha256(before.scene().particle_sha256());
+      }
+      before = frame;
       grpc::Status status = before_frame ? before_frame(index) : grpc::Status::OK;
       if (status.ok()) {
-        status =
-            Answer(index, request.frame(),
-                   [stream](const v1::RenderSequenceResponse& message) { stream->Write(message); });
+        status = Answer(index, frame, [stream](const v1::RenderSequenceResponse& message) {
+          stream->Write(message);
+        });
       }
       if (!status.ok()) {
         return {status.error_code(),
                 "frame " + std::to_string(index) + ": " + status.error_message()};
       }
     }
-    return grpc::Status::OK;
   }
 
  private:
-  grpc::Status Enter(const std::string& rpc) {
+  grpc::Status Enter(const std::string& rpc, grpc::ServerContext& context) {
     const std::lock_guard lock(mutex_);
     ++calls_[rpc];
     std::deque<grpc::Status>& failures = failures_[rpc];
@@ -207,7 +233,21 @@ class FakeService final : public v1::RenderService::Service {
     }
     grpc::Status status = failures.front();
     failures.pop_front();
+    if (status.error_code() == grpc::StatusCode::RESOURCE_EXHAUSTED && gives_hints) {
+      context.AddTrailingMetadata("grpc-retry-pushback-ms", "1");
+    }
     return status;
+  }
+
+  static void SendEmptyFrame(
+      uint64_t index,
+      grpc::ServerReaderWriter<v1::RenderSequenceResponse, v1::RenderSequenceRequest>& stream) {
+    v1::RenderSequenceResponse message;
+    message.set_frame_index(index);
+    message.mutable_header();
+    stream.Write(message);
+    message.mutable_trailer();
+    stream.Write(message);
   }
 
   void NoteRoute(const grpc::ServerContext& context) {
@@ -238,7 +278,9 @@ class FakeService final : public v1::RenderService::Service {
     header.mutable_header()->mutable_metadata()->set_request_id(request.request_id());
     for (int i = 0; i < request.outputs_size(); ++i) {
       const std::string bytes = OutputBytes(request, i);
-      header.mutable_header()->add_outputs()->set_byte_size(bytes.size());
+      v1::OutputInfo& info = *header.mutable_header()->add_outputs();
+      *info.mutable_output() = request.outputs(i);
+      info.set_byte_size(bytes.size());
       trailer.mutable_trailer()->add_output_crc32c(ExtendCrc32c(0, bytes));
     }
     send(header);

@@ -193,6 +193,8 @@ TEST(RenderFlags, TargetAndSettingsTakeEachOthersPlace) {
   ASSERT_TRUE(target.ok());
   ExpectJson(RequestOf({"--slices", "7"}, *target),
              R"({"scene": {"camera": {}, "shadow": {"slices": 7}}})");
+  ExpectJson(RequestOf({"--fit-degree", "2"}, *target),
+             R"({"scene": {"camera": {}, "shadow": {"fit_degree": 2}}})");
   ExpectJson(RequestOf({"--max-time", "40"}, *target),
              R"({"scene": {"camera": {}}, "target": {"max_error": 0.05, "max_time_ms": 40}})");
   ExpectJson(
@@ -254,6 +256,16 @@ TEST(RenderFlags, TakeOneValueEachSoThatTheInputMayComeLast) {
   EXPECT_EQ(options.outputs.size(), 1U);
 }
 
+TEST(RenderFlags, TakeTheFarthestThatTheServerTakes) {
+  RenderOptions options;
+  EXPECT_EQ(Parse({"--eye", "1e18,0,-1e18", "--light", "point:1e18,0,0", "--light", "1e30,0,0",
+                   "--up", "0,1e30,0", "--ortho-height", "1e-15", "--time-offset", "-1e17",
+                   "--phase-g", "-0.9999999", "--scattering-g", "0.9999999"},
+                  options),
+            "");
+  EXPECT_LT(static_cast<float>(*options.scattering_g), 1.0F);
+}
+
 TEST(RenderFlags, TellNoLightsFromNoFlag) {
   EXPECT_FALSE(RequestOf({"a.ply"}).scene().has_lighting());
   EXPECT_TRUE(RequestOf({"a.ply", "--light", "none"}).scene().has_lighting());
@@ -270,6 +282,12 @@ TEST(RenderFlags, NameTheFlagTheValueAndWhatIsAllowed) {
            Case{{"--size", "0x4"}, {"--size", "'0x4'"}},
            Case{{"--eye", "1,2"}, {"--eye", "'1,2'", "x,y,z"}},
            Case{{"--eye", "1,2,nan"}, {"--eye", "'1,2,nan'"}},
+           Case{{"--eye", "0,0,1.1e18"}, {"--eye", "'0,0,1.1e18'", "-1e18 to 1e18"}},
+           Case{{"--target", "-2e18,0,0"}, {"--target", "'-2e18,0,0'", "-1e18 to 1e18"}},
+           Case{{"--light", "point:0,2e18,0"}, {"--light", "'point:0,2e18,0'", "-1e18 to 1e18"}},
+           Case{{"--ortho-height", "1e-16"}, {"--ortho-height", "'1e-16'", "1e-15 to 1e18"}},
+           Case{{"--ortho-height", "2e18"}, {"--ortho-height", "'2e18'", "1e-15 to 1e18"}},
+           Case{{"--time-offset", "2e17"}, {"--time-offset", "'2e17'", "-1e17 to 1e17"}},
            Case{{"--fov", "179"}, {"--fov", "'179'", "< 179"}},
            Case{{"--fov", "wide"}, {"--fov", "'wide'"}},
            Case{{"--radius", "0"}, {"--radius", "'0'", "1e-15 to 1e17"}},
@@ -279,11 +297,13 @@ TEST(RenderFlags, NameTheFlagTheValueAndWhatIsAllowed) {
            // Infinite as the 32-bit floats that they become.
            Case{{"--density", "1e39"}, {"--density", "'1e39'", "3e38"}},
            Case{{"--scattering", "1e39"}, {"--scattering", "'1e39'", "3e38"}},
-           Case{{"--scattering-g", "1"}, {"--scattering-g", "'1'", "< 1"}},
            Case{{"--scattering-albedo", "1.5"}, {"--scattering-albedo", "'1.5'", "0 to 1"}},
            Case{{"--scattering", "0.1", "--scattering-g", "0.5"}, {"--scattering"}},
            Case{{"--radius", "1e39"}, {"--radius", "'1e39'"}},
-           Case{{"--phase-g", "1"}, {"--phase-g", "'1'", "< 1"}},
+           // 1 as the 32-bit floats that they become.
+           Case{{"--phase-g", "0.99999999"}, {"--phase-g", "'0.99999999'", "0.9999999"}},
+           Case{{"--phase-g", "-0.99999999"}, {"--phase-g", "-0.9999999 to 0.9999999"}},
+           Case{{"--scattering-g", "0.99999999"}, {"--scattering-g", "0 to 0.9999999"}},
            Case{{"--slices", "0"}, {"--slices", "'0'", "from 1"}},
            Case{{"--slices", "1.5"}, {"--slices", "'1.5'"}},
            Case{{"--profile", "hard"}, {"--profile", "'hard'", "soft|ball"}},
@@ -296,6 +316,14 @@ TEST(RenderFlags, NameTheFlagTheValueAndWhatIsAllowed) {
            Case{{"-o", "a.exr", "--bits", "16"}, {"--bits", ".png"}},
            Case{{"-o", "a.png", "--exr", "half"}, {"--exr", ".exr"}},
            Case{{"--bits", "12"}, {"--bits", "'12'", "8|16"}},
+           Case{{"-o", "transmittance=t.exr", "--quantity", "optical-depth"},
+                {"--quantity", "--output light or layers"}},
+           // There is no output that they could be of, such as with --print-scene.
+           Case{{"--bits", "16"}, {"--bits", "--output that ends in .png"}},
+           Case{{"--exr", "float"}, {"--exr", "--output that ends in .exr"}},
+           Case{{"--exr-compression", "zip"}, {"--exr-compression", "--output"}},
+           Case{{"--quantity", "transmittance"}, {"--quantity", "--output"}},
+           Case{{"--output-light", "1"}, {"--output-light", "--output"}},
            Case{{"--timeout", "-1"}, {"--timeout", "'-1'"}},
            Case{{"--fov", "40", "--ortho"}, {"--fov", "--ortho"}},
            Case{{"--supersample", "2", "--downsample", "2"}, {"--supersample", "--downsample"}},

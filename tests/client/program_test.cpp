@@ -2,12 +2,16 @@
 // understand, and what it does when nobody takes its words. Needs no server.
 #include <gmock/gmock.h>
 #include <sys/wait.h>
+#include <unistd.h>
 
 #include <array>
+#include <csignal>
 #include <cstdio>
+#include <optional>
 #include <string>
 
 #include "client/cli/exit_code.h"
+#include "client/cli/interrupt.h"
 #include "tests/client/test_bytes.h"
 
 namespace halflight::client {
@@ -70,6 +74,23 @@ TEST(Program, FailsWhereItsReportIsLost) {
   const Ended closed = Shell(scene + " 2>&1 >&-");
   EXPECT_EQ(closed.exit_code, 0);
   EXPECT_THAT(closed.text, IsEmpty());
+}
+
+// As under nohup, and behind the & of a shell.
+TEST(InterruptWatch, LeavesSignalsAloneThatAreIgnored) {
+  for (const int signal : {SIGINT, SIGHUP}) {
+    auto* const before = std::signal(signal, SIG_IGN);
+    std::optional<InterruptWatch> watch(std::in_place);
+    const std::stop_token stop = watch->stop();
+    kill(getpid(), signal);
+    sigset_t pending;
+    do {
+      sigpending(&pending);
+    } while (sigismember(&pending, signal) == 1);
+    watch.reset();  // its thread has heeded by then whatever it took
+    EXPECT_FALSE(stop.stop_requested());
+    std::signal(signal, before);
+  }
 }
 
 }  // namespace

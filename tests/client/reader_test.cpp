@@ -3,18 +3,20 @@
 #include "client/readers/reader.h"
 
 #include <gmock/gmock.h>
+#include <sys/resource.h>
 
 #include <cmath>
 #include <limits>
 
 #include "tests/client/test_bytes.h"
+#include "tests/sanitizers.h"
 
 namespace halflight::client {
 namespace {
 
 using absl::StatusCode;
-using testing::Each;
-using testing::ElementsAre;
+using ::testing::Each;
+using ::testing::ElementsAre;
 
 TEST(ReadParticles, ReadsTheWholePlume) {
   const auto particles = ReadParticles(HALFLIGHT_TEST_DATA "/plume/plume.0040.ply");
@@ -54,6 +56,20 @@ TEST(ReadParticles, NamesTheFileThatItCannotOpen) {
               {"directory"});
   ExpectError(ReadParticles("a.ply", "obj").status(), StatusCode::kInvalidArgument,
               {"'obj'", "ply, csv, npy, raw"});
+}
+
+TEST(ReadParticles, NamesTheFileThatDoesNotFitIntoMemory) {
+  if (testing::kSanitized) GTEST_SKIP() << "they end a process that asks for so much";
+  const TestDirectory directory;
+  const std::string path = directory.Write("a.csv", "x,y,z\n");
+  struct rlimit before {};
+  getrlimit(RLIMIT_AS, &before);
+  const struct rlimit little { rlim_t{1} << 30, before.rlim_max };
+  std::filesystem::resize_file(path, std::uintmax_t{1} << 33);  // a hole
+  setrlimit(RLIMIT_AS, &little);
+  const absl::Status status = ReadParticles(path).status();
+  setrlimit(RLIMIT_AS, &before);
+  ExpectError(status, StatusCode::kResourceExhausted, {path, "memory"});
 }
 
 TEST(ReadParticles, NamesTheParticleWhoseValueIsImpossible) {

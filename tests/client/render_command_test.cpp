@@ -2,11 +2,13 @@
 // codes.
 #include "client/cli/render_command.h"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <unistd.h>
 
 #include <fstream>
 #include <sstream>
+#include <thread>
 
 #include "client/cli/exit_code.h"
 #include "client/cli/file_writer.h"
@@ -136,6 +138,20 @@ TEST_F(RenderCommandTest, NamesTheFileOfAFrameThatTheServerRefused) {
   EXPECT_THAT(MessageOf(status), HasSubstr("a.11.csv: bad radius"));
 }
 
+TEST_F(RenderCommandTest, IsDoneWithTheLastFrameWhateverTheServerSendsThen) {
+  for (const char* name : {"a.1.csv", "a.2.csv"}) {
+    directory_.Write(name, kCloud);
+  }
+  options_.input = directory_ / "a.%d.csv";
+  options_.frames = {1, 2};
+  Output("f.%d.png");
+  service_.end_of_sequence = {grpc::StatusCode::INTERNAL, "late fault"};
+  EXPECT_EQ(ExitCodeOf(Run()), ExitCode::kOk);
+  service_.unasked_frame = 2;
+  EXPECT_EQ(ExitCodeOf(Run()), ExitCode::kOk);
+  EXPECT_EQ(Files(), 4U);
+}
+
 TEST_F(RenderCommandTest, TellsCausesApartByExitCode) {
   options_.input = directory_.Write("a.csv", kCloud);
   EXPECT_EQ(ExitCodeOf(Run()), ExitCode::kUsage);  // no output
@@ -155,6 +171,16 @@ TEST_F(RenderCommandTest, TellsCausesApartByExitCode) {
   options_.connection.server = service_.address();
   stop_.request_stop();
   EXPECT_EQ(ExitCodeOf(Run()), ExitCode::kInterrupted);
+}
+
+TEST_F(RenderCommandTest, TakesNoTimeoutForNoneButZero) {
+  service_.tamper = [](auto&) { std::this_thread::sleep_for(std::chrono::milliseconds(50)); };
+  options_.input = directory_.Write("a.csv", kCloud);
+  Output("a.png");
+  options_.connection.timeout_s = 0.0004;
+  EXPECT_EQ(ExitCodeOf(Run()), ExitCode::kServerUnavailable);
+  options_.connection.timeout_s = 0;
+  EXPECT_EQ(ExitCodeOf(Run()), ExitCode::kOk);
 }
 
 TEST_F(RenderCommandTest, AsksForTheFramesOfAPattern) {
@@ -178,13 +204,6 @@ TEST_F(RenderCommandTest, RendersNothingThatItMayNotWrite) {
   Output("sealed/a.png");
   EXPECT_EQ(ExitCodeOf(Run()), ExitCode::kOutput);
   EXPECT_EQ(service_.Calls("RenderFrame"), 0);
-}
-
-TEST_F(RenderCommandTest, RefusesToWriteOneFileTwice) {
-  options_.input = directory_.Write("a.csv", kCloud);
-  Output("a.png");
-  Output("a.png", v1::OUTPUT_KIND_COVERAGE);
-  EXPECT_EQ(ExitCodeOf(Run()), ExitCode::kUsage);
 }
 
 TEST_F(RenderCommandTest, RendersAnEmptyFile) {
@@ -222,66 +241,6 @@ TEST_F(RenderCommandTest, ReportsOneLineOfJsonAFrame) {
   EXPECT_THAT(printed, HasSubstr("\"outputs\":[{\"name\":"));
 }
 
-TEST_F(RenderCommandTest, LetsFlagsStandInForTheFilesValues) {
-  options_.input = directory_.Write("a.csv", kCloud);
-  EXPECT_EQ(ReadInput(options_, options_.input)->radii.size(), 2U);
-  options_.radius = 0.25;
-  options_.opacity = 0.5;
-  const auto particles = ReadInput(options_, options_.input);
-  EXPECT_TRUE(particles->radii.empty());
-  EXPECT_TRUE(particles->opacities.empty());
-}
-
-TEST_F(RenderCommandTest, ChoosesOnlyWhatIsOpen) {
-  options_.input = directory_.Write("a.csv", kCloud);
-  Output("a.png");
-  const auto job = PlanRender(options_);
-  ASSERT_TRUE(job.ok()) << job.status();
-  const v1::Scene& scene = job->request.scene();
-  EXPECT_FALSE(scene.material().has_radius());   // the file has radii
-  EXPECT_FALSE(scene.material().has_opacity());  // and opacities
-  EXPECT_TRUE(scene.camera().look_at().has_eye());
-  EXPECT_EQ(scene.lighting().lights_size(), 1);
-  EXPECT_FALSE(scene.has_shadow());
-}
-
-TEST_F(RenderCommandTest, ChoosesOnceForASequence) {
-  directory_.Write("a.1.csv", "x,y,z\n0,0,0\n1,1,1\n");
-  directory_.Write("a.2.csv", "x,y,z\n0,0,0\n9,9,9\n");
-  options_.input = directory_ / "a.%d.csv";
-  Output("a.%d.png");
-  options_.frames = {1, 2};
-  const auto both = PlanRender(options_);
-  options_.frames = {1};
-  const auto first = PlanRender(options_);
-  ASSERT_TRUE(both.ok() && first.ok());
-  EXPECT_EQ(both->request.scene().material().radius(), first->request.scene().material().radius());
-  // The camera stands back for the last frame, which is larger.
-  EXPECT_GT(both->request.scene().camera().look_at().eye().z(),
-            first->request.scene().camera().look_at().eye().z() + 5);
-}
-
-TEST_F(RenderCommandTest, PointsALightAlongTheView) {
-  options_.input = directory_.Write("a.csv", kCloud);
-  Output("a.png");
-  options_.eye = Vec3{0, 0, 7};
-  options_.target = Vec3{0, 0, 2};
-  options_.lights = {LightFlag{}};
-  const auto job = PlanRender(options_);
-  ASSERT_TRUE(job.ok()) << job.status();
-  const v1::Light& light = job->request.scene().lighting().lights(0);
-  EXPECT_EQ(light.directional().direction().z(), -5);
-  // The same view as a matrix gives the same light.
-  options_.eye.reset();
-  options_.target.reset();
-  options_.scene_path = directory_.Write(
-      "s.json",
-      R"({"scene": {"camera": {"world_to_camera": {"elements": [1,0,0,0, 0,1,0,0, 0,0,1,-7, 0,0,0,1]}}}})");
-  const auto by_matrix = PlanRender(options_);
-  ASSERT_TRUE(by_matrix.ok()) << by_matrix.status();
-  EXPECT_EQ(by_matrix->request.scene().lighting().lights(0).directional().direction().z(), -1);
-}
-
 TEST(WriteFileWhole, ReplacesAFileAndLeavesNothingBeside) {
   const TestDirectory directory;
   const std::string path = directory.Write("a", "old and longer");
@@ -291,6 +250,14 @@ TEST(WriteFileWhole, ReplacesAFileAndLeavesNothingBeside) {
   EXPECT_TRUE(WriteFileWhole("/dev/null", "x").ok());
   EXPECT_FALSE(fs::is_regular_file("/dev/null"));
   EXPECT_THAT(MessageOf(WriteFileWhole(directory / "none/a", "x")), HasSubstr("none/a"));
+}
+
+TEST(WriteFileWhole, LeavesFilesAloneThatItHasNotMade) {
+  const TestDirectory directory;
+  const std::string other = directory.Write(fmt::format(".a.{}.0.tmp", getpid()), "another's");
+  ASSERT_TRUE(WriteFileWhole(directory / "a", "new").ok());
+  EXPECT_EQ(Contents(directory / "a"), "new");
+  EXPECT_EQ(Contents(other), "another's");
 }
 
 TEST(ProgressLine, ShowsFramesSpeedAndTimeLeft) {

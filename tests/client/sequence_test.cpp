@@ -2,7 +2,9 @@
 #include <gmock/gmock.h>
 
 #include <atomic>
+#include <stdexcept>
 #include <thread>
+#include <utility>
 
 #include "client/client.h"
 #include "tests/client/fake_service.h"
@@ -36,9 +38,20 @@ class SequenceTest : public testing::Test {
     if (index == fail_source_at_) {
       return absl::DataLossError("f.ply: line 3");
     }
+    if (index == throw_at_) {
+      throw std::out_of_range("out of reach");
+    }
     SequenceFrame frame;
-    frame.request.add_outputs()->set_kind(v1::OUTPUT_KIND_BEAUTY);
     frame.request.set_request_id("f" + std::to_string(index));
+    if (inherits_ && index > 0) {
+      if (index == 1) {
+        frame.request.mutable_scene()->mutable_camera()->set_width(11);
+        frame.request.mutable_target()->set_max_error(0.5);
+      }
+      return frame;
+    }
+    frame.request.add_outputs()->set_kind(v1::OUTPUT_KIND_BEAUTY);
+    frame.request.mutable_scene()->mutable_shadow()->set_slices(3);
     Particles particles;
     particles.positions.assign(30, static_cast<float>(index));
     frame.particles = EncodeParticles(particles);
@@ -50,6 +63,8 @@ class SequenceTest : public testing::Test {
   std::vector<uint64_t> taken_;
   std::atomic<uint64_t> sourced_ = 0;
   uint64_t fail_source_at_ = 1000;
+  uint64_t throw_at_ = 1000;
+  bool inherits_ = false;  // requests after the first leave out what they can
   std::function<absl::Status(uint64_t)> sink_;
 };
 
@@ -148,6 +163,63 @@ TEST_F(SequenceTest, DetectsFramesOutOfOrder) {
     }
   };
   ExpectError(Render(4), StatusCode::kDataLoss, {"frame 2 came where frame 1"});
+}
+
+TEST_F(SequenceTest, TakesNoFrameBeyondTheLast) {
+  service_.unasked_frame = 3;
+  EXPECT_TRUE(Render(3).ok());
+  EXPECT_THAT(taken_, ElementsAre(0, 1, 2));
+}
+
+TEST_F(SequenceTest, RefusesAFrameThatItHasNotAskedFor) {
+  service_.unasked_frame = 1;
+  ExpectError(Render(3, 0), StatusCode::kDataLoss, {});
+  EXPECT_THAT(taken_, ElementsAre(0));
+}
+
+TEST_F(SequenceTest, IsDoneWithTheLastFrameHoweverTheStreamEnds) {
+  service_.end_of_sequence = {grpc::StatusCode::INTERNAL, "late fault"};
+  EXPECT_TRUE(Render(3).ok());
+  EXPECT_EQ(service_.Calls("RenderSequence"), 1);
+}
+
+TEST_F(SequenceTest, EndsWithTheExceptionOfTheSource) {
+  throw_at_ = 2;
+  ExpectError(Render(4), StatusCode::kInternal, {"frame 2: out of reach"});
+  EXPECT_THAT(taken_, ElementsAre(0, 1));
+}
+
+TEST_F(SequenceTest, DoesNotTakeItsOwnTimeForSilence) {
+  options_.timeout = std::chrono::milliseconds(500);
+  sink_ = [](uint64_t index) {
+    if (index == 1) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(1200));
+    }
+    return absl::OkStatus();
+  };
+  const absl::Status status = Render(4);
+  EXPECT_TRUE(status.ok()) << status;
+}
+
+TEST_F(SequenceTest, WhatRequestsLeaveOutSurvivesABrokenStream) {
+  inherits_ = true;
+  std::vector<v1::RenderFrameRequest> seen;
+  service_.on_request = [&](const v1::RenderFrameRequest& request) { seen.push_back(request); };
+  bool broken = false;
+  service_.before_frame = [&](uint64_t index) {
+    return index == 2 && !std::exchange(broken, true) ? kUnavailable : grpc::Status::OK;
+  };
+  ASSERT_TRUE(Render(4, 0).ok());
+  ASSERT_EQ(seen.size(), 5U);
+  EXPECT_FALSE(seen[2].scene().has_camera());
+  const v1::RenderFrameRequest& first_of_second = seen[3];
+  EXPECT_EQ(first_of_second.request_id(), "f2");
+  EXPECT_EQ(first_of_second.outputs_size(), 1);
+  EXPECT_EQ(first_of_second.scene().camera().width(), 11U) << "of frame 1";
+  EXPECT_EQ(first_of_second.target().max_error(), 0.5) << "of frame 1, which ended the shadow";
+  EXPECT_FALSE(first_of_second.scene().has_shadow());
+  EXPECT_FALSE(first_of_second.scene().particle_sha256().empty());
+  EXPECT_FALSE(seen[4].scene().has_camera());
 }
 
 TEST_F(SequenceTest, DetectsDamagedOutputs) {

@@ -1,10 +1,11 @@
 #include "tests/soak/call.h"
 
 #include <future>
+#include <limits>
 #include <utility>
 
 #include "client/frame_reader.h"
-#include "halflight/v1/service.pb.h"
+#include "halflight/v1/service.grpc.pb.h"
 
 namespace halflight::soak {
 
@@ -29,6 +30,13 @@ void KeepQueueOfCallbacks() {
     done.get_future().wait();
     return channel;
   }();
+}
+
+// By a message of RenderFrame.
+google::protobuf::RepeatedPtrField<v1::Output> OutputsAskedFor(grpc::ByteBuffer message) {
+  v1::RenderFrameRequest request;
+  grpc::SerializationTraits<v1::RenderFrameRequest>::Deserialize(&message, &request);
+  return request.outputs();
 }
 
 }  // namespace
@@ -123,7 +131,10 @@ void Call::AddToFrame() {
   }
   switch (part.message.part_case()) {
     case v1::RenderFrameResponse::kHeader:
-      sound_ = assembler_.AddHeader(part.message.header()).ok();
+      sound_ = assembler_
+                   .AddHeader(part.message.header(), OutputsAskedFor(options_.messages.front()),
+                              std::numeric_limits<uint64_t>::max())
+                   .ok();
       break;
     case v1::RenderFrameResponse::kChunk:
       sound_ = assembler_.AddChunk(part.message.chunk(), part.chunk_data).ok();
