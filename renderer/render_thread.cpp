@@ -88,6 +88,8 @@ class RenderThread : public FrameEngine {
   // From now on there are no frames.
   void End(const absl::Status& why);
   Job WarmUpJob();
+  // What warms up now, if anything does: another may begin only when no job waits.
+  void StopWarmUp();
   // Of those that wait; they need not do so until it is their turn.
   void AnswerStopped();
   // The next job, if it may be begun beside these. Waits for one where there are none; none when
@@ -122,19 +124,16 @@ absl::Status RenderThread::Start() {
 }
 
 RenderThread::~RenderThread() {
-  std::stop_source warming_up(std::nostopstate);
   {
     const std::lock_guard lock(mutex_);
     stopping_ = true;
-    warming_up = warming_up_;
   }
   changed_.notify_all();
-  warming_up.request_stop();
+  StopWarmUp();
   if (thread_.joinable()) thread_.join();
 }
 
 absl::Status RenderThread::Submit(FrameRequest request, std::stop_token stop, Done done) {
-  std::stop_source warming_up(std::nostopstate);
   {
     const std::lock_guard lock(mutex_);
     if (!end_.ok()) return end_;
@@ -146,10 +145,9 @@ absl::Status RenderThread::Submit(FrameRequest request, std::stop_token stop, Do
     }
     ++unfinished_;
     jobs_.push_back({std::move(request), std::move(stop), std::move(done), Clock::now()});
-    warming_up = warming_up_;
   }
   changed_.notify_all();
-  warming_up.request_stop();
+  StopWarmUp();
   return absl::OkStatus();
 }
 
@@ -295,6 +293,14 @@ RenderThread::Job RenderThread::WarmUpJob() {
             if (!absl::IsCancelled(frame.status())) warm_up_.pop_front();
           },
           Clock::now()};
+}
+
+void RenderThread::StopWarmUp() {
+  const std::stop_source warming_up = [this] {
+    const std::lock_guard lock(mutex_);
+    return warming_up_;
+  }();
+  warming_up.request_stop();
 }
 
 void RenderThread::Run(std::promise<absl::Status> started) {
