@@ -50,6 +50,7 @@ class RenderThread : public FrameEngine {
     std::stop_token stop;
     Done done;
     Clock::time_point submitted;
+    bool counts = true;  // among those that may wait or render at once
   };
 
   // A job whose frame was begun, or failed to be.
@@ -97,7 +98,7 @@ class RenderThread : public FrameEngine {
   std::optional<Job> NextJob(const FrameRenderer& renderer, const Flights& flights);
   Flight Begin(FrameRenderer& renderer, Job job);
   void Finish(FrameRenderer& renderer, Flights& flights);
-  void Answer(const Done& done, absl::StatusOr<FrameResult> frame);
+  void Answer(const Job& job, absl::StatusOr<FrameResult> frame);
 
   const RenderThreadOptions options_;
   DeviceInfo device_;         // set before the engine serves
@@ -194,7 +195,7 @@ void RenderThread::AnswerStopped() {
     std::move(first, jobs_.end(), std::back_inserter(stopped));
     jobs_.erase(first, jobs_.end());
   }
-  for (const Job& job : stopped) Answer(job.done, absl::CancelledError("frame cancelled"));
+  for (const Job& job : stopped) Answer(job, absl::CancelledError("frame cancelled"));
 }
 
 RenderThread::Flight RenderThread::Begin(FrameRenderer& renderer, Job job) {
@@ -208,12 +209,12 @@ RenderThread::Flight RenderThread::Begin(FrameRenderer& renderer, Job job) {
   return flight;
 }
 
-void RenderThread::Answer(const Done& done, absl::StatusOr<FrameResult> frame) {
-  {
+void RenderThread::Answer(const Job& job, absl::StatusOr<FrameResult> frame) {
+  if (job.counts) {
     const std::lock_guard lock(mutex_);
     --unfinished_;
   }
-  done(std::move(frame));
+  job.done(std::move(frame));
 }
 
 // The oldest.
@@ -221,18 +222,18 @@ void RenderThread::Finish(FrameRenderer& renderer, Flights& flights) {
   Flight flight = std::move(flights.frames.front());
   flights.frames.pop_front();
   if (!flight.frame.ok()) {
-    Answer(flight.job.done, flights.Told(flight.frame.status()));
+    Answer(flight.job, flights.Told(flight.frame.status()));
   } else if (flight.job.stop.stop_requested() && !FrameRenderer::IsDrawn(**flight.frame, {})) {
-    Answer(flight.job.done, absl::CancelledError("frame cancelled"));
+    Answer(flight.job, absl::CancelledError("frame cancelled"));
     flights.cancelled.push_back(std::move(flight));
   } else {
     absl::StatusOr<FrameResult> frame = renderer.Finish(*std::move(flight.frame));
     flight.watched.reset();
     if (frame.ok()) {
       frame->timings.insert(frame->timings.begin(), {"queue", flight.queued_ms});
-      Answer(flight.job.done, std::move(frame));
+      Answer(flight.job, std::move(frame));
     } else {
-      Answer(flight.job.done, flights.Told(frame.status()));
+      Answer(flight.job, flights.Told(frame.status()));
     }
   }
 }
@@ -248,7 +249,7 @@ absl::Status RenderThread::Serve(FrameRenderer& renderer) {
         flights.cancelled.begin(), flights.cancelled.end(),
         [look](const Flight& flight) { return !FrameRenderer::IsDrawn(**flight.frame, look); });
     if (absl::Status reset = renderer.CheckReset(); !reset.ok()) {
-      for (const Flight& flight : flights.frames) Answer(flight.job.done, flights.Told(reset));
+      for (const Flight& flight : flights.frames) Answer(flight.job, flights.Told(reset));
       return reset;
     }
     flights.cancelled.erase(drawn, flights.cancelled.end());
@@ -278,21 +279,20 @@ void RenderThread::End(const absl::Status& why) {
     end_ = why;
     jobs.swap(jobs_);
   }
-  for (const Job& job : jobs) Answer(job.done, why);
+  for (const Job& job : jobs) Answer(job, why);
 }
 
 // What is drawn where nobody waits: a request ends it, so as not to wait for what others may want.
 // Under the mutex.
 RenderThread::Job RenderThread::WarmUpJob() {
   warming_up_ = {};
-  ++unfinished_;
   return {warm_up_.front(), warming_up_.get_token(),
           [this](const absl::StatusOr<FrameResult>& frame) {
             // The turn of one that was stopped comes again. Whoever asks for such a frame is told
             // what is wrong with it.
             if (!absl::IsCancelled(frame.status())) warm_up_.pop_front();
           },
-          Clock::now()};
+          Clock::now(), /*counts=*/false};
 }
 
 void RenderThread::StopWarmUp() {

@@ -89,8 +89,9 @@ TEST(WarmEngine, MakesRoomForRequestsAndTakesUpWhatItLeft) {
   // The first, then the client's, then all of them; the last tells that it was drawn.
   auto faults = PlannedFaults::Parse(absl::StrCat("late:1,innocent-reset:", frames + 2));
   ASSERT_TRUE(faults.ok()) << faults.status();
-  auto engine = StartRenderThread(
-      {.renderer = {.faults = std::make_shared<PlannedFaults>(*faults)}, .warm_up = true});
+  auto engine = StartRenderThread({.max_queued_frames = 1,  // what warms up takes nobody's place
+                                   .renderer = {.faults = std::make_shared<PlannedFaults>(*faults)},
+                                   .warm_up = true});
   ASSERT_TRUE(engine.ok()) << engine.status();
   const auto wait_for = [&engine](const auto& what) {
     const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(120);
