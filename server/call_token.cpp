@@ -43,29 +43,23 @@ absl::Status OutcomeOf(const absl::Status& status, Cancellation by) {
 
 absl::Status CallCount::Enter(const std::string& client, const ServerLimits& limits) {
   const std::lock_guard lock(mutex_);
-  if (entered_ >= limits.max_calls) {
+  if (entered_.total() >= limits.max_calls) {
     return BusyError(v1::ERROR_REASON_TOO_MANY_CALLS,
-                     fmt::format("{} calls are under way", entered_),
+                     fmt::format("{} calls are under way", entered_.total()),
                      fmt::format("at most {}", limits.max_calls));
   }
-  const auto own = entered_of_.find(client);
-  if (own != entered_of_.end() && own->second >= limits.max_client_calls) {
+  if (entered_.Of(client) >= limits.max_client_calls) {
     return BusyError(v1::ERROR_REASON_TOO_MANY_CALLS,
-                     fmt::format("{} calls of this client are under way", own->second),
+                     fmt::format("{} calls of this client are under way", entered_.Of(client)),
                      fmt::format("at most {}", limits.max_client_calls));
   }
-  ++entered_;
-  ++entered_of_[client];
+  entered_.Add(client);
   return absl::OkStatus();
 }
 
 void CallCount::Leave(const std::string& client) {
   const std::lock_guard lock(mutex_);
-  --entered_;
-  const auto own = entered_of_.find(client);
-  if (--own->second == 0) {
-    entered_of_.erase(own);
-  }
+  entered_.Remove(client);
 }
 
 CallToken::CallToken(Rpc rpc, CallCount& count, const Backend& backend, const Access& access,

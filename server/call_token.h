@@ -8,7 +8,6 @@
 #include <cstdint>
 #include <mutex>
 #include <string>
-#include <unordered_map>
 
 #include <grpcpp/server_context.h>
 #include <grpcpp/support/status.h>
@@ -16,6 +15,7 @@
 #include "absl/status/status.h"
 #include "server/access/access.h"
 #include "server/caller.h"
+#include "server/client_counts.h"
 #include "server/handlers/backend.h"
 #include "server/metrics/metrics.h"
 
@@ -34,8 +34,7 @@ struct CallCount {
 
  private:
   std::mutex mutex_;
-  uint32_t entered_ = 0;  // of those that are active: who is refused takes nobody's place
-  std::unordered_map<std::string, uint32_t> entered_of_;  // by client; none at 0
+  ClientCounts entered_;  // of those that are active: who is refused takes nobody's place
 };
 
 // Counted before draining is looked at, so that whoever drains and then sees no calls can be sure

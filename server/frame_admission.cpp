@@ -13,14 +13,14 @@ absl::StatusOr<std::shared_ptr<FrameAdmission::Memory>> FrameAdmission::Admit(
     const std::string& client, uint64_t bytes) {
   auto memory = std::make_shared<Memory>(memory_);
   const std::lock_guard lock(mutex_);
-  if (queued_ >= limits_.max_queued_frames) {
-    return BusyError(v1::ERROR_REASON_QUEUE_FULL, fmt::format("{} frames are under way", queued_),
+  if (queued_.total() >= limits_.max_queued_frames) {
+    return BusyError(v1::ERROR_REASON_QUEUE_FULL,
+                     fmt::format("{} frames are under way", queued_.total()),
                      fmt::format("at most {}", limits_.max_queued_frames));
   }
-  const auto own = queued_of_.find(client);
-  if (own != queued_of_.end() && own->second >= limits_.max_client_frames) {
+  if (queued_.Of(client) >= limits_.max_client_frames) {
     return BusyError(v1::ERROR_REASON_CLIENT_QUEUE_FULL,
-                     fmt::format("{} frames of this client are under way", own->second),
+                     fmt::format("{} frames of this client are under way", queued_.Of(client)),
                      fmt::format("at most {}", limits_.max_client_frames));
   }
   if (!memory->Grow(bytes)) {
@@ -29,8 +29,7 @@ absl::StatusOr<std::shared_ptr<FrameAdmission::Memory>> FrameAdmission::Admit(
                      fmt::format("{} for all frames, of which {} are left", limits_.max_frame_bytes,
                                  memory_->left()));
   }
-  ++queued_;
-  ++queued_of_[client];
+  queued_.Add(client);
   ++under_way_;
   ++accepted_;
   return memory;
@@ -38,11 +37,7 @@ absl::StatusOr<std::shared_ptr<FrameAdmission::Memory>> FrameAdmission::Admit(
 
 void FrameAdmission::OnEncoded(const std::string& client) {
   const std::lock_guard lock(mutex_);
-  --queued_;
-  const auto own = queued_of_.find(client);
-  if (--own->second == 0) {
-    queued_of_.erase(own);
-  }
+  queued_.Remove(client);
 }
 
 void FrameAdmission::OnEnded() {
@@ -58,7 +53,7 @@ void FrameAdmission::WaitUntilIdle() {
 
 uint32_t FrameAdmission::queued() const {
   const std::lock_guard lock(mutex_);
-  return queued_;
+  return queued_.total();
 }
 
 bool FrameAdmission::idle() const {

@@ -8,11 +8,11 @@
 #include <memory>
 #include <mutex>
 #include <string>
-#include <unordered_map>
 #include <utility>
 
 #include "absl/status/statusor.h"
 #include "server/byte_budget.h"
+#include "server/client_counts.h"
 
 namespace halflight {
 
@@ -63,8 +63,7 @@ class FrameAdmission {
   const std::shared_ptr<ByteBudget> memory_;
   mutable std::mutex mutex_;
   std::condition_variable ended_;
-  uint32_t queued_ = 0;
-  std::unordered_map<std::string, uint32_t> queued_of_;  // by client; none at 0
+  ClientCounts queued_;
   uint32_t under_way_ = 0;
   uint64_t accepted_ = 0;
 };

@@ -4,7 +4,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
-#include <utility>
+#include <string>
 
 #include "renderer/field_error.h"
 #include "server/handlers/render_frame.h"
@@ -97,41 +97,34 @@ std::optional<Message> Parse(grpc::ByteBuffer bytes) {
   return message;
 }
 
-class RenderFrameCall final : public grpc::ServerWriteReactor<grpc::ByteBuffer>,
-                              public ResponseSink<v1::RenderFrameResponse> {
-  using Reactor = grpc::ServerWriteReactor<grpc::ByteBuffer>;
-
+// A call that sends frames: what both kinds have in common.
+template <typename Reactor, template <typename> typename Sink, typename Response, typename Handler>
+class SendingCall : public Reactor, public Sink<Response> {
  public:
-  RenderFrameCall(SharedByCalls& shared, CallbackServerContext& context,
-                  const grpc::ByteBuffer& request)
-      : request_(Parse<v1::RenderFrameRequest>(request)),
-        token_(Rpc::kRenderFrame, shared.count, shared.backend, shared.access, context,
-               request_.has_value() ? request_->request_id() : ""),
-        stall_(shared.timer, StallLimit(shared.backend), EndForStall(token_, shared.backend)),
-        handler_(std::make_shared<RenderFrameHandler>(shared.backend, *this, token_.caller())) {
-    token_.OnReceived(request.Length());
-    if (!token_.refusal().ok()) {
-      RenderFrameCall::Finish(token_.refusal());
-    } else if (!request_.has_value()) {
-      RenderFrameCall::Finish(FieldError("message", "bytes that are none", "a RenderFrameRequest"));
-    } else {
-      handler_->Start(*std::exchange(request_, std::nullopt));
-    }
-  }
-
   void OnWriteDone(bool ok) override {
     stall_.End();
     token_.OnSent(ok ? response_.Length() : 0);
     handler_->OnWritten(ok);
   }
-  void OnCancel() override { handler_->OnCancel(); }
+  void OnCancel() override {
+    // One that is refused is finished already, and its handler knows nothing of it.
+    if (token_.refusal().ok()) {
+      handler_->OnCancel();
+    }
+  }
   void OnDone() override { delete this; }
 
- private:
-  void Write(const OutgoingMessage<v1::RenderFrameResponse>& outgoing) override {
+ protected:
+  SendingCall(Rpc rpc, SharedByCalls& shared, CallbackServerContext& context,
+              const std::string& request_id)
+      : token_(rpc, shared.count, shared.backend, shared.access, context, request_id),
+        stall_(shared.timer, StallLimit(shared.backend), EndForStall(token_, shared.backend)),
+        handler_(std::make_shared<Handler>(shared.backend, *this, token_.caller())) {}
+
+  void Write(const OutgoingMessage<Response>& outgoing) override {
     response_ = ToByteBuffer(outgoing);
     stall_.Begin();
-    StartWrite(&response_);
+    this->StartWrite(&response_);
   }
   void Finish(const absl::Status& status) override {
     const grpc::Status told = token_.End(status);
@@ -139,22 +132,40 @@ class RenderFrameCall final : public grpc::ServerWriteReactor<grpc::ByteBuffer>,
     Reactor::Finish(told);
   }
 
-  std::optional<v1::RenderFrameRequest> request_;  // until the call begins
   CallToken token_;
   StallGuard stall_;
-  const std::shared_ptr<RenderFrameHandler> handler_;
+  const std::shared_ptr<Handler> handler_;
+
+ private:
   grpc::ByteBuffer response_;
 };
 
-class RenderSequenceCall final : public grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer>,
-                                 public DuplexSink<v1::RenderSequenceResponse> {
-  using Reactor = grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer>;
+class RenderFrameCall final
+    : public SendingCall<grpc::ServerWriteReactor<grpc::ByteBuffer>, ResponseSink,
+                         v1::RenderFrameResponse, RenderFrameHandler> {
+ public:
+  // `request`: none where the bytes of the message are not one.
+  RenderFrameCall(SharedByCalls& shared, CallbackServerContext& context, size_t request_bytes,
+                  const std::optional<v1::RenderFrameRequest>& request)
+      : SendingCall(Rpc::kRenderFrame, shared, context,
+                    request.has_value() ? request->request_id() : "") {
+    token_.OnReceived(request_bytes);
+    if (!token_.refusal().ok()) {
+      RenderFrameCall::Finish(token_.refusal());
+    } else if (!request.has_value()) {
+      RenderFrameCall::Finish(FieldError("message", "bytes that are none", "a RenderFrameRequest"));
+    } else {
+      handler_->Start(*request);
+    }
+  }
+};
 
+class RenderSequenceCall final
+    : public SendingCall<grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer>, DuplexSink,
+                         v1::RenderSequenceResponse, RenderSequenceHandler> {
  public:
   RenderSequenceCall(SharedByCalls& shared, CallbackServerContext& context)
-      : token_(Rpc::kRenderSequence, shared.count, shared.backend, shared.access, context),
-        stall_(shared.timer, StallLimit(shared.backend), EndForStall(token_, shared.backend)),
-        handler_(std::make_shared<RenderSequenceHandler>(shared.backend, *this, token_.caller())) {
+      : SendingCall(Rpc::kRenderSequence, shared, context, "") {
     if (!token_.refusal().ok()) {
       RenderSequenceCall::Finish(token_.refusal());
     } else {
@@ -175,37 +186,11 @@ class RenderSequenceCall final : public grpc::ServerBidiReactor<grpc::ByteBuffer
       handler_->OnUnreadableRequest();
     }
   }
-  void OnWriteDone(bool ok) override {
-    stall_.End();
-    token_.OnSent(ok ? response_.Length() : 0);
-    handler_->OnWritten(ok);
-  }
-  void OnCancel() override {
-    // One that is refused is finished already, and its handler knows nothing of it.
-    if (token_.refusal().ok()) {
-      handler_->OnCancel();
-    }
-  }
-  void OnDone() override { delete this; }
 
  private:
   void Read() override { StartRead(&request_); }
-  void Write(const OutgoingMessage<v1::RenderSequenceResponse>& outgoing) override {
-    response_ = ToByteBuffer(outgoing);
-    stall_.Begin();
-    StartWrite(&response_);
-  }
-  void Finish(const absl::Status& status) override {
-    const grpc::Status told = token_.End(status);
-    stall_.Begin();
-    Reactor::Finish(told);
-  }
 
-  CallToken token_;
-  StallGuard stall_;
-  const std::shared_ptr<RenderSequenceHandler> handler_;
   grpc::ByteBuffer request_;
-  grpc::ByteBuffer response_;
 };
 
 }  // namespace
@@ -218,7 +203,8 @@ grpc::ServerReadReactor<v1::UploadParticlesRequest>* NewUploadCall(
 grpc::ServerWriteReactor<grpc::ByteBuffer>* NewRenderFrameCall(SharedByCalls& shared,
                                                                CallbackServerContext& context,
                                                                const grpc::ByteBuffer& request) {
-  return new RenderFrameCall(shared, context, request);
+  return new RenderFrameCall(shared, context, request.Length(),
+                             Parse<v1::RenderFrameRequest>(request));
 }
 
 grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer>* NewRenderSequenceCall(
