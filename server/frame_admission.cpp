@@ -13,15 +13,8 @@ absl::StatusOr<std::shared_ptr<FrameAdmission::Memory>> FrameAdmission::Admit(
     const std::string& client, uint64_t bytes) {
   auto memory = std::make_shared<Memory>(memory_);
   const std::lock_guard lock(mutex_);
-  if (queued_.total() >= limits_.max_queued_frames) {
-    return BusyError(v1::ERROR_REASON_QUEUE_FULL,
-                     fmt::format("{} frames are under way", queued_.total()),
-                     fmt::format("at most {}", limits_.max_queued_frames));
-  }
-  if (queued_.Of(client) >= limits_.max_client_frames) {
-    return BusyError(v1::ERROR_REASON_CLIENT_QUEUE_FULL,
-                     fmt::format("{} frames of this client are under way", queued_.Of(client)),
-                     fmt::format("at most {}", limits_.max_client_frames));
+  if (absl::Status place = FindPlace(client); !place.ok()) {
+    return place;
   }
   if (!memory->Grow(bytes)) {
     return BusyError(v1::ERROR_REASON_FRAME_MEMORY_FULL,
@@ -33,6 +26,26 @@ absl::StatusOr<std::shared_ptr<FrameAdmission::Memory>> FrameAdmission::Admit(
   ++under_way_;
   ++accepted_;
   return memory;
+}
+
+absl::Status FrameAdmission::PlaceFor(const std::string& client) const {
+  const std::lock_guard lock(mutex_);
+  return FindPlace(client);
+}
+
+// Under the mutex.
+absl::Status FrameAdmission::FindPlace(const std::string& client) const {
+  if (queued_.total() >= limits_.max_queued_frames) {
+    return BusyError(v1::ERROR_REASON_QUEUE_FULL,
+                     fmt::format("{} frames are under way", queued_.total()),
+                     fmt::format("at most {}", limits_.max_queued_frames));
+  }
+  if (queued_.Of(client) >= limits_.max_client_frames) {
+    return BusyError(v1::ERROR_REASON_CLIENT_QUEUE_FULL,
+                     fmt::format("{} frames of this client are under way", queued_.Of(client)),
+                     fmt::format("at most {}", limits_.max_client_frames));
+  }
+  return absl::OkStatus();
 }
 
 void FrameAdmission::OnEncoded(const std::string& client) {

@@ -10,6 +10,7 @@
 #include <string>
 #include <utility>
 
+#include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "server/byte_budget.h"
 #include "server/client_counts.h"
@@ -41,6 +42,8 @@ class FrameAdmission {
 
   explicit FrameAdmission(const AdmissionLimits& limits);
 
+  // Whether a frame of this client would find a place now: ResourceExhausted as from Admit.
+  [[nodiscard]] absl::Status PlaceFor(const std::string& client) const;
   // A frame that takes up to so much memory. ResourceExhausted with reason and retry hint.
   absl::StatusOr<std::shared_ptr<Memory>> Admit(const std::string& client, uint64_t bytes);
   // Once for each that was let in: it is encoded, or has failed, and leaves its place to another.
@@ -59,6 +62,8 @@ class FrameAdmission {
   [[nodiscard]] uint64_t memory_bytes() const { return memory_->used(); }
 
  private:
+  [[nodiscard]] absl::Status FindPlace(const std::string& client) const;
+
   const AdmissionLimits limits_;
   const std::shared_ptr<ByteBudget> memory_;
   mutable std::mutex mutex_;

@@ -82,6 +82,11 @@ class FramePipeline {
   // client, or when they hold too much memory. Any thread.
   absl::Status Submit(FrameJob job, std::stop_token stop, Done done);
 
+  // Whether Submit would find a place for a frame of this client now, its memory left aside: for
+  // refusing what needs no looking into. Any thread.
+  [[nodiscard]] absl::Status PlaceFor(const std::string& client) const {
+    return admission_.PlaceFor(client);
+  }
   // Frames accepted and not yet encoded. Any thread.
   [[nodiscard]] uint32_t queued() const { return admission_.queued(); }
   // Frames that wait for the engine. Any thread.

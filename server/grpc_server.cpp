@@ -17,6 +17,7 @@
 #include <grpcpp/server.h>
 #include <grpcpp/server_builder.h>
 
+#include "absl/synchronization/mutex.h"
 #include "grpc/health/v1/health.pb.h"
 #include "halflight/v1/service.grpc.pb.h"
 #include "server/listen/acceptor.h"
@@ -97,6 +98,9 @@ absl::StatusOr<std::unique_ptr<GrpcServer>> GrpcServer::Start(std::vector<Listen
                                                               const Backend& backend,
                                                               const GrpcServerOptions& options) {
   gpr_set_log_function(ForwardLog);
+  // Abseil looks for deadlocks at each lock of gRPC's where it was built without NDEBUG, as Debian
+  // 12 builds it, and keeps a graph of them. Can go with a package that is built otherwise.
+  absl::SetMutexDeadlockDetectionMode(absl::OnDeadlockCycle::kIgnore);
   google::protobuf::SetLogHandler(ForwardProtobufLog);
   grpc::EnableDefaultHealthCheckService(true);
   grpc::reflection::InitProtoReflectionServerBuilderPlugin();

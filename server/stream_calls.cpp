@@ -92,8 +92,6 @@ std::optional<Message> Parse(grpc::ByteBuffer bytes) {
   if (!grpc::SerializationTraits<Message>::Deserialize(&bytes, &message).ok()) {
     return std::nullopt;
   }
-  // A sequence keeps what it is sent, which is bounded by what is known.
-  message.DiscardUnknownFields();
   return message;
 }
 
@@ -180,7 +178,9 @@ class RenderSequenceCall final
       return;
     }
     token_.OnReceived(request_.Length());
-    if (const auto message = Parse<v1::RenderSequenceRequest>(request_)) {
+    if (auto message = Parse<v1::RenderSequenceRequest>(request_)) {
+      // It keeps what it is sent, which is bounded by what is known.
+      message->DiscardUnknownFields();
       handler_->OnRequest(*message);
     } else {
       handler_->OnUnreadableRequest();

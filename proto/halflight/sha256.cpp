@@ -6,11 +6,22 @@
 
 namespace halflight {
 
+namespace {
+
+// Looked up once: OpenSSL 3 does so for each digest otherwise, which takes longer than the digest of
+// something short.
+const EVP_MD* Algorithm() {
+  static const EVP_MD* const kAlgorithm = EVP_MD_fetch(nullptr, "SHA256", nullptr);
+  return kAlgorithm;
+}
+
+}  // namespace
+
 struct Sha256::Context {
   EVP_MD_CTX* evp = EVP_MD_CTX_new();
 
   Context() {
-    if (evp == nullptr || EVP_DigestInit_ex(evp, EVP_sha256(), nullptr) != 1) {
+    if (evp == nullptr || EVP_DigestInit_ex(evp, Algorithm(), nullptr) != 1) {
       throw std::bad_alloc();
     }
   }

@@ -8,14 +8,16 @@
 namespace halflight {
 
 void RenderFrameHandler::Start(const v1::RenderFrameRequest& request) {
+  // First: where more is asked for than can be drawn, refusing must cost little.
+  const absl::Status place = backend_.pipeline.PlaceFor(caller_.client());
   const std::string& sha256 = request.scene().particle_sha256();
-  if (backend_.store.OnDiskOnly(sha256)) {
+  if (place.ok() && backend_.store.OnDiskOnly(sha256)) {
     backend_.store.Fetch(sha256, stop_.get_token(),
                          [self = shared_from_this(), request](const absl::Status& fetched) {
                            self->Begin(request, fetched);
                          });
   } else {
-    Begin(request, absl::OkStatus());
+    Begin(request, place);
   }
 }
 

@@ -283,6 +283,29 @@ TEST_F(Handlers, InvalidFrameIsRefusedWithoutRendering) {
   EXPECT_EQ(engine_.rendered(), 0);
 }
 
+TEST_F(Handlers, WhereThereIsNoPlaceAFrameIsRefusedUnseenAndNothingIsReadForIt) {
+  const OnDisk disk(limits_);
+  FramePipeline full(
+      engine_, {.admission = {.max_queued_frames = 1}, .encode_threads = 1, .encode = EncodePlain});
+  const Backend backend{engine_.device(), limits_, version_, *disk.store, partial_uploads_, full};
+  engine_.SetGate(false);
+  FakeSink<v1::RenderFrameResponse> first_sink;
+  const auto first = std::make_shared<RenderFrameHandler>(backend, first_sink);
+  first->Start(MakeRequest());
+  v1::RenderFrameRequest invalid = disk.Request();
+  invalid.clear_outputs();
+  for (const v1::RenderFrameRequest& request : {disk.Request(), invalid}) {
+    FakeSink<v1::RenderFrameResponse> sink;
+    std::make_shared<RenderFrameHandler>(backend, sink)->Start(request);
+    ASSERT_TRUE(sink.finished().has_value()) << "at once";
+    EXPECT_EQ(DetailOf(*sink.finished()).reason, v1::ERROR_REASON_QUEUE_FULL) << *sink.finished();
+  }
+  EXPECT_TRUE(disk.store->OnDiskOnly(disk.sha256));
+  engine_.SetGate(true);
+  EXPECT_TRUE(first_sink.WaitForWrite());
+  first->OnWritten(false);
+}
+
 TEST_F(Handlers, CancelledFrameEndsAsCancelled) {
   engine_.SetGate(false);
   FakeSink<v1::RenderFrameResponse> sink;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <fstream>
 #include <string>
 
 namespace halflight::soak {
@@ -14,6 +15,11 @@ inline void DamageAFile(const std::string& cache) {
       return;
     }
   }
+}
+
+// A file that was being written when the server ended, which the next one has not removed.
+inline void LeaveHalfAFile(const std::string& cache) {
+  std::ofstream(cache + "/" + std::string(64, 'a') + ".particles.writing") << "half of it";
 }
 
 }  // namespace halflight::soak

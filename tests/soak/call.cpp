@@ -165,9 +165,9 @@ const grpc::Status& Call::Wait() {
   return status_;
 }
 
-bool Call::WaitFor(std::chrono::milliseconds time) {
-  std::unique_lock lock(mutex_);
-  return changed_.wait_for(lock, time, [this] { return done_; });
+bool Call::done() const {
+  const std::lock_guard lock(mutex_);
+  return done_;
 }
 
 bool Call::WaitForMessages(int count) {

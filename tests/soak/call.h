@@ -47,7 +47,7 @@ class Call final : public grpc::ClientBidiReactor<grpc::ByteBuffer, grpc::ByteBu
   void ReadOn();
   // Waits for the end.
   const grpc::Status& Wait();
-  bool WaitFor(std::chrono::milliseconds time);
+  [[nodiscard]] bool done() const;
   // Waits until so many messages have come, or the call has ended; whether they have.
   bool WaitForMessages(int count);
   [[nodiscard]] int messages() const;

@@ -55,7 +55,7 @@ class SlowReader {
     if (done_) {
       return true;
     }
-    if (!call_->WaitFor(milliseconds(0))) {
+    if (!call_->done()) {
       if (call_->messages() > 0 && !begun_.has_value()) {
         begun_ = Clock::now();
       }

@@ -21,6 +21,8 @@ using testing::Chunk;
 using testing::Finish;
 using testing::Header;
 
+constexpr std::chrono::seconds kPatience(20);
+
 // Messages of one call, which must not end with OK.
 struct Bad {
   std::string name;
@@ -185,8 +187,9 @@ std::vector<std::string> Mutated(const Set& set, std::mt19937& random) {
 }
 
 std::shared_ptr<Call> Send(const std::shared_ptr<grpc::Channel>& channel, const std::string& method,
-                           const std::vector<std::string>& messages) {
-  CallOptions options{.method = method, .deadline = std::chrono::seconds(20)};
+                           const std::vector<std::string>& messages,
+                           std::chrono::seconds patience = kPatience) {
+  CallOptions options{.method = method, .deadline = patience};
   for (const std::string& message : messages) {
     options.messages.push_back(soak::Bytes(message));
   }
@@ -210,7 +213,6 @@ bool IsHere(const std::shared_ptr<grpc::Channel>& channel, const std::string& sh
 
 void RunMalformed(Run& run) {
   const testing::Folder folder;
-  // Sabotaged: a server that says OK to everything.
   // Little room, so that what is kept of uploads on purpose is soon all that may be.
   const Server server(folder, {"--max-particle-bytes", "1MiB", "--max-cache-bytes", "2MiB"},
                       run.sabotage ? "soak_bad_server" : "halflightd");
@@ -220,6 +222,7 @@ void RunMalformed(Run& run) {
     Upload(server.address(), known);
   }
   const std::vector<Bad> questions = BadQuestions(known.sha256);
+  const auto patience = run.sabotage ? std::chrono::seconds(1) : kPatience;
   std::mt19937 random(6);
   size_t calls = 0;
   size_t wrongly_ok = 0;
@@ -241,7 +244,7 @@ void RunMalformed(Run& run) {
       bad.push_back(BadUploads(SetOf(3000, 1000 * static_cast<uint32_t>(round) + i))[i]);
     }
     for (const Bad& one : bad) {
-      const auto call = Send(channel, one.method, one.messages);
+      const auto call = Send(channel, one.method, one.messages, patience);
       ++calls;
       if (call->status().ok()) {
         if (++wrongly_ok < 10) {
@@ -265,7 +268,7 @@ void RunMalformed(Run& run) {
   if (!run.short_form) {
     server.Rest();
   }
-  run.report.TimeAtMost("memory more", server.Megabytes() - before, 4, " MiB");
+  run.report.MemoryAtMost("memory more", server.Megabytes() - before, run.Of(4, 40));
   run.report.Holds("serves afterwards", server.Serves());
   if (!run.sabotage) {
     MustRender(channel, FrameOf(known.sha256, 32));

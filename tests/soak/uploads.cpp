@@ -76,7 +76,7 @@ void RunUploadClientsKilled(Run& run) {
   const std::string cache = folder / "cache";
   std::vector<std::string> flags = {"--cache-dir", cache};
   if (run.sabotage) {
-    flags.insert(flags.end(), {"--partial-upload-seconds", "0"});
+    flags.insert(flags.end(), {"--partial-upload-seconds", "1"});
   }
   const Server server(folder, flags);
   auto client = client::Client::Connect(server.address());
@@ -112,6 +112,10 @@ void RunUploadClientsKilled(Run& run) {
       least = there.committed_bytes();
     }
     received += least;
+    if (run.sabotage) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(1500));
+    }
+    lost += Query(*stub, particles.sha256).committed_bytes() >= least ? 0 : 1;
     Require(client->EnsureUploaded(particles), "the upload that goes on");
     Require(Query(*stub, particles.sha256).complete(), "the set is there");
     const std::string file = FileOf(cache, particles.sha256);
@@ -157,6 +161,7 @@ void RunUploadServersKilled(Run& run) {
     Server server(folder, flags);
     if (run.sabotage) {
       DamageAFile(cache);
+      LeaveHalfAFile(cache);
     }
     for (const auto& entry : fs::directory_iterator(cache)) {
       const std::string name = entry.path().filename();
