@@ -140,8 +140,10 @@ void AddLimitFlags(CLI::App& app, Options& options) {
   };
   number("--max-particles", limits.max_particles, "Particles of one set");
   bytes("--max-particle-bytes", limits.max_particle_bytes, "Bytes of one particle set");
-  bytes("--max-cache-bytes", limits.max_cache_bytes,
-        "Bytes of all particle sets kept in memory, and of all uploads in progress or broken off");
+  bytes(
+      "--max-cache-bytes", limits.max_cache_bytes,
+      "Bytes of all particle sets kept in memory, and as many again of all uploads in progress or "
+      "broken off");
   bytes("--max-cache-dir-bytes", limits.max_cache_dir_bytes, "Bytes of all particle sets on disk")
       ->needs(cache_dir);
   number("--max-partial-uploads", limits.max_partial_uploads,

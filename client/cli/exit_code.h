@@ -12,7 +12,7 @@ enum class ExitCode : int {
   kUsage = 2,              // flags or scene file
   kInput = 3,              // a particle file is missing or malformed
   kRefused = 4,            // the server refused the request
-  kServerUnavailable = 5,  // no server could be started or reached, or it did not answer in time
+  kServerUnavailable = 5,  // no server was started or reached, had room, or answered in time
   kOutput = 6,             // a file could not be written
   kTargetMissed = 7,       // --max-error or --max-time was not met; the best frame is written
   kInterrupted = 130,      // SIGINT or SIGTERM
@@ -21,9 +21,9 @@ enum class ExitCode : int {
 // The same list for --help.
 inline constexpr const char* kExitCodesHelp =
     "Exit codes: 0 done; 1 fault of the server, or damaged data; 2 wrong flags or scene file;\n"
-    "3 particle file missing or malformed; 4 the server refused the request; 5 no server, or no\n"
-    "answer in time; 6 a file could not be written; 7 --max-error or --max-time not met, the best\n"
-    "frame tried is written; 130 interrupted.";
+    "3 particle file missing or malformed; 4 the server refused the request; 5 no server, none\n"
+    "with room, or no answer in time; 6 a file could not be written; 7 --max-error or --max-time\n"
+    "not met, the best frame tried is written; 130 interrupted.";
 
 // The same status, to end with `code`. Cancellation stays what it is.
 absl::Status WithExitCode(absl::Status status, ExitCode code);

@@ -22,6 +22,9 @@ namespace {
 using std::chrono::milliseconds;
 
 constexpr int kClients = 3;
+// Of the sets that frames are drawn of.
+constexpr size_t kSizes = 4;
+constexpr uint32_t kSeeds = 8;
 
 struct Work {
   std::atomic<size_t> frames = 0;
@@ -64,9 +67,27 @@ class Client {
     }
   }
 
+  // What the server keeps of sets and of work on them is of what it was asked for last: of the same
+  // then, whatever came before.
+  void AskForAll() {
+    for (size_t size = 0; size < kSizes; ++size) {
+      for (uint32_t seed = 0; seed < kSeeds; ++seed) {
+        const client::EncodedParticles particles = SetOf(size, seed);
+        for (const v1::RenderFrameRequest& request :
+             {FrameOf(particles.sha256, 64, 8), SweepOf(particles.sha256, 64)}) {
+          Expect(client_.RenderFrame(request, &particles).ok(), work_.frames);
+        }
+      }
+    }
+  }
+
  private:
+  static client::EncodedParticles SetOf(size_t size, uint32_t seed) {
+    return BallOf(1000 + 500 * size, seed);
+  }
+
   // Of one of a few sets, so that some are kept and some come back.
-  client::EncodedParticles SomeSet() { return BallOf(1000 + 500 * (random_() % 4), random_() % 8); }
+  client::EncodedParticles SomeSet() { return SetOf(random_() % kSizes, random_() % kSeeds); }
 
   v1::RenderFrameRequest SomeFrame(const std::string& sha256) {
     const int pixels = 32 * static_cast<int>(1 + random_() % 4);
@@ -146,9 +167,9 @@ void RunMixedWork(Run& run) {
   const testing::Folder folder;
   // What is kept on purpose is full soon.
   std::vector<std::string> flags = {
-      "--max-particle-bytes",  "1MiB",  "--max-cache-bytes", "4MiB",
-      "--max-reuse-bytes",     "16MiB", "--cache-dir",       folder / "cache",
-      "--max-cache-dir-bytes", "4MiB"};
+      "--max-particle-bytes",  "1MiB", "--max-cache-bytes", "1MiB",
+      "--max-reuse-bytes",     "1MiB", "--cache-dir",       folder / "cache",
+      "--max-cache-dir-bytes", "1MiB"};
   if (run.sabotage) {
     flags.insert(flags.end(), {"--device", "leaks"});
   }
@@ -161,12 +182,13 @@ void RunMixedWork(Run& run) {
   // Work and rest by turns. What is left after a rest, when freed memory has gone back to the
   // system, is what the server holds; what it has while it works goes up and down by far more.
   const std::chrono::duration<double> turn(run.short_form ? 0.4 : 30.0);
-  const int turns = run.Of(18, 8);
+  const int turns = run.Of(23, 8);
   const int warm = run.Of(5, 2);
   std::vector<Point> held;
   const auto begin = Clock::now();
   for (int i = 0; i < turns; ++i) {
     DoWork(clients, turn);
+    clients.front().AskForAll();
     if (!run.short_form) {
       server.Rest();
     }
