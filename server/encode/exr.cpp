@@ -54,7 +54,7 @@ void AddAttributes(const EncodeInput& input, ImageFile& file) {
   const auto add = [&file](const std::string& name, const AttributeValue& value) {
     file.attributes.emplace_back(name, value);
   };
-  for (const auto& [name, value] : metadata.text) add(name, value);
+  for (const auto& [name, value] : metadata.text) add(name, Remark{value});
   if (metadata.world_to_camera.has_value()) {
     const glm::dmat4 left_handed = glm::scale(glm::dmat4(1.0), glm::dvec3(1.0, 1.0, -1.0));
     add("worldToCamera", RowVectorMatrix(left_handed * *metadata.world_to_camera));

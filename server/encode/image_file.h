@@ -21,7 +21,12 @@ enum class SampleType : uint8_t { kUint8, kUint16, kHalf, kFloat };
 
 using Chromaticities = std::array<float, 8>;  // x and y of red, green, blue and white
 using MatrixRows = std::array<float, 16>;     // row by row
-using AttributeValue = std::variant<int, std::string, Chromaticities, MatrixRows>;
+// What a file says to its readers. Of such texts nothing is kept once the file is written.
+struct Remark {
+  std::string text;
+};
+// A string is a word that the library knows, or one of few: it keeps them for ever.
+using AttributeValue = std::variant<int, std::string, Remark, Chromaticities, MatrixRows>;
 
 struct ImageFile {
   const char* format = "";  // the library's name, which is also the ending of such files' names

@@ -122,7 +122,9 @@ absl::StatusOr<EncodedImage> EncodePng(const EncodeInput& input) {
                  .display_size = {},
                  .attributes = {},
                  .parts = {}};
-  for (const auto& [name, value] : input.metadata.text) file.attributes.emplace_back(name, value);
+  for (const auto& [name, value] : input.metadata.text) {
+    file.attributes.emplace_back(name, Remark{value});
+  }
   file.attributes.emplace_back("oiio:ColorSpace", beauty ? "sRGB" : "Linear");
   file.attributes.emplace_back("png:compressionLevel", kCompressionLevel);
   file.attributes.emplace_back("png:filter", kUpFilter);
@@ -131,8 +133,10 @@ absl::StatusOr<EncodedImage> EncodePng(const EncodeInput& input) {
   const std::optional<Range> range = FindRange(input);
   if (range.has_value()) {
     encoded.white_black = {range->white, range->black};
-    file.attributes.emplace_back("halflight:white_value", absl::StrFormat("%.9g", range->white));
-    file.attributes.emplace_back("halflight:black_value", absl::StrFormat("%.9g", range->black));
+    file.attributes.emplace_back("halflight:white_value",
+                                 Remark{absl::StrFormat("%.9g", range->white)});
+    file.attributes.emplace_back("halflight:black_value",
+                                 Remark{absl::StrFormat("%.9g", range->black)});
   }
   const std::vector<Integer> codes =
       beauty ? QuantizeBeauty<Integer>(image.pixels) : QuantizeLinear<Integer>(input, range);

@@ -6,8 +6,12 @@
 #include <cstring>
 #include <memory>
 #include <stop_token>
+#include <string>
 #include <thread>
+#include <utility>
+#include <vector>
 
+#include <OpenImageIO/ustring.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -123,6 +127,33 @@ TEST(EncodeImage, RefusesACropOutsideTheWholeImage) {
   EXPECT_THAT(Refusal(image, ImageKind::kCoverage, metadata), testing::HasSubstr("data_window"));
   metadata.data_window = {8, 9, 2, 1};
   EXPECT_EQ(Refusal(image, ImageKind::kCoverage, metadata), "");
+}
+
+// A server writes for months, and what it writes of particles and errors is new each time.
+TEST(EncodeImage, KeepsNothingOfWhatFilesSay) {
+  const Image beauty = MakeBeauty(4, 3);
+  Image depth = MakeImage(2, 1, {"Z"}, {});
+  Image layers = MakeImage(2, 2, {"Y"}, std::vector<float>(size_t{9} * 4, 0.5F), 9);
+  const std::vector<std::pair<const Image*, ImageKind>> images = {
+      {&beauty, ImageKind::kBeauty},
+      {&depth, ImageKind::kDepth},
+      {&layers, ImageKind::kLightLayers}};
+  const auto encode_all = [&](int frame) {
+    ImageMetadata metadata = SomeMetadata();
+    metadata.text.emplace_back("halflight:particles", std::string(40, 'a') + std::to_string(frame));
+    depth.pixels = {1.0F, 2.0F + static_cast<float>(frame)};
+    for (const ImageFormat format : kEveryFormat) {
+      for (const auto& [image, kind] : images) {
+        EXPECT_TRUE(Encode(*image, kind, format, LightQuantity::kTransmittance, metadata).ok());
+      }
+    }
+  };
+  encode_all(0);
+  const size_t kept = OIIO::ustring::total_ustrings();
+  for (int frame = 1; frame <= 20; ++frame) {
+    encode_all(frame);
+  }
+  EXPECT_EQ(OIIO::ustring::total_ustrings(), kept);
 }
 
 TEST(EncodeImage, RefusesTextThatHeadersCannotHold) {
