@@ -15,9 +15,9 @@ namespace halflight {
 std::string StageKey(std::string stage);
 
 // As text: request_id=a tenant=b peer=ipv4:127.0.0.1:40000 technique=SHADOW_TECHNIQUE_HALF_ANGLE
-// particles=65536 size=640x480 outputs=2 render_ms=12.3 ... outcome=OK; call_id where the call has another name. A
-// measured error adds relative_rmse=0.031, a target attempts=2 target_met=true, a failure reason
-// and message. Of a frame that failed only the timings are looked at.
+// particles=65536 size=640x480 outputs=2 render_ms=12.3 ... outcome=OK; call_id where the call has
+// another name. A measured error adds relative_rmse=0.031, a target attempts=2 target_met=true, a
+// failure reason and message. Of a frame that failed only the timings are looked at.
 LogFields FrameFields(const FrameJob& job, const MadeFrame& frame, const absl::Status& outcome);
 
 // A request that never became a frame.

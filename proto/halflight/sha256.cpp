@@ -8,8 +8,8 @@ namespace halflight {
 
 namespace {
 
-// Looked up once: OpenSSL 3 does so for each digest otherwise, which takes longer than the digest of
-// something short.
+// Looked up once: OpenSSL 3 does so for each digest otherwise, which takes longer than the digest
+// of something short.
 const EVP_MD* Algorithm() {
   static const EVP_MD* const kAlgorithm = EVP_MD_fetch(nullptr, "SHA256", nullptr);
   return kAlgorithm;
