@@ -85,10 +85,9 @@ struct SetAttribute {
 
   void operator()(int value) const { spec.attribute(name, value); }
   void operator()(const std::string& value) const { spec.attribute(name, value); }
-  // OpenImageIO 2.4 keeps each string that it is given in a table until the
-  // process ends, and every frame has others. So it gets the address of the text in place of the
-  // address in its table: to its writers of PNG and EXR a ustring is a pointer to characters, and
-  // no more is looked at.
+  // OpenImageIO 2.4 keeps each string that it is given in a table until the process ends, and every
+  // frame has others. So it gets the address of the text in place of the address in its table: to
+  // its writers of PNG and EXR a ustring is a pointer to characters, and no more is looked at.
   void operator()(const Remark& value) const {
     static_assert(sizeof(OIIO::ustring) == sizeof(const char*));
     const char* const characters = value.text.c_str();
