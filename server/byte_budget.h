@@ -1,43 +1,56 @@
-// A number of bytes shared by several users, given out first come, first served. Allocates nothing
-// itself and never waits: what does not fit is refused.
+// A number of bytes shared by clients, given out first come, first served, to each of them so much
+// at most. Never waits: what does not fit is refused.
 #pragma once
 
-#include <atomic>
 #include <cstdint>
+#include <limits>
+#include <mutex>
+#include <string>
+#include <string_view>
+#include <unordered_map>
+#include <utility>
 
 namespace halflight {
 
+// All calls: any thread.
 class ByteBudget {
  public:
-  explicit ByteBudget(uint64_t total) : total_(total), left_(total) {}
+  enum class Growth {
+    kDone,
+    kClientFull,  // less than that is left for this client
+    kFull,        // for this client enough, for all not
+  };
 
-  // A share of the budget, given back when it goes out of scope. Grows under one user only; the
-  // budget must outlive it.
+  explicit ByteBudget(uint64_t total, uint64_t each = std::numeric_limits<uint64_t>::max())
+      : total_(total), each_(each) {}
+
+  // Part of what a client has of the budget, given back when it goes out of scope. Used by one
+  // thread at a time; the budget must outlive it.
   class Share {
    public:
-    explicit Share(ByteBudget& budget) : budget_(budget) {}
+    explicit Share(ByteBudget& budget, std::string client = "")
+        : budget_(budget), client_(std::move(client)) {}
     ~Share() { Release(); }
     Share(const Share&) = delete;
     Share& operator=(const Share&) = delete;
     Share(Share&&) = delete;
     Share& operator=(Share&&) = delete;
 
-    // False, and nothing changed, where the budget has less than this left.
-    [[nodiscard]] bool Grow(uint64_t bytes) {
-      uint64_t left = budget_.left_.load();
-      do {
-        if (bytes > left) {
-          return false;
-        }
-      } while (!budget_.left_.compare_exchange_weak(left, left - bytes));
-      taken_ += bytes;
-      return true;
+    [[nodiscard]] const std::string& client() const { return client_; }
+
+    // Nothing has changed unless it is kDone.
+    [[nodiscard]] Growth Grow(uint64_t bytes) {
+      const Growth growth = budget_.Take(client_, bytes);
+      if (growth == Growth::kDone) {
+        taken_ += bytes;
+      }
+      return growth;
     }
 
     // Gives back what is beyond `bytes`.
     void ShrinkTo(uint64_t bytes) {
       if (bytes < taken_) {
-        budget_.left_ += taken_ - bytes;
+        budget_.GiveBack(client_, taken_ - bytes);
         taken_ = bytes;
       }
     }
@@ -46,16 +59,24 @@ class ByteBudget {
 
    private:
     ByteBudget& budget_;
+    const std::string client_;
     uint64_t taken_ = 0;
   };
 
-  [[nodiscard]] uint64_t total() const { return total_; }
-  [[nodiscard]] uint64_t left() const { return left_; }
-  [[nodiscard]] uint64_t used() const { return total_ - left_; }
+  [[nodiscard]] uint64_t used() const;
+  [[nodiscard]] uint64_t left() const { return total_ - used(); }
+  // What is allowed, as errors say it. `growth`: not kDone; `users`: as in "uploads".
+  [[nodiscard]] std::string Allowed(Growth growth, std::string_view users) const;
 
  private:
+  Growth Take(const std::string& client, uint64_t bytes);
+  void GiveBack(const std::string& client, uint64_t bytes);
+
   const uint64_t total_;
-  std::atomic<uint64_t> left_;
+  const uint64_t each_;
+  mutable std::mutex mutex_;
+  uint64_t used_ = 0;
+  std::unordered_map<std::string, uint64_t> used_by_;  // none at 0
 };
 
 }  // namespace halflight

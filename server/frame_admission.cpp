@@ -7,20 +7,21 @@
 namespace halflight {
 
 FrameAdmission::FrameAdmission(const AdmissionLimits& limits)
-    : limits_(limits), memory_(std::make_shared<ByteBudget>(limits.max_frame_bytes)) {}
+    : limits_(limits),
+      memory_(std::make_shared<ByteBudget>(limits.max_frame_bytes, limits.max_client_frame_bytes)) {
+}
 
 absl::StatusOr<std::shared_ptr<FrameAdmission::Memory>> FrameAdmission::Admit(
     const std::string& client, uint64_t bytes) {
-  auto memory = std::make_shared<Memory>(memory_);
+  auto memory = std::make_shared<Memory>(memory_, client);
   const std::lock_guard lock(mutex_);
   if (absl::Status place = FindPlace(client); !place.ok()) {
     return place;
   }
-  if (!memory->Grow(bytes)) {
+  if (const auto growth = memory->Grow(bytes); growth != ByteBudget::Growth::kDone) {
     return BusyError(v1::ERROR_REASON_FRAME_MEMORY_FULL,
                      fmt::format("the frame takes up to {} bytes", bytes),
-                     fmt::format("{} for all frames, of which {} are left", limits_.max_frame_bytes,
-                                 memory_->left()));
+                     memory_->Allowed(growth, "frames"));
   }
   queued_.Add(client);
   ++under_way_;

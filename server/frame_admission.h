@@ -22,6 +22,8 @@ struct AdmissionLimits {
   uint32_t max_client_frames = 64;  // of these, of one client
   // Of pixels, and once a frame is encoded of its files, until the frame is sent.
   uint64_t max_frame_bytes = std::numeric_limits<uint64_t>::max();
+  // Of these, of one client.
+  uint64_t max_client_frame_bytes = std::numeric_limits<uint64_t>::max();
 };
 
 // All calls: any thread.
@@ -30,9 +32,10 @@ class FrameAdmission {
   // A frame's part of the memory that frames may take; may outlive the admission.
   class Memory {
    public:
-    explicit Memory(std::shared_ptr<ByteBudget> of) : budget_(std::move(of)), share_(*budget_) {}
+    Memory(std::shared_ptr<ByteBudget> of, const std::string& client)
+        : budget_(std::move(of)), share_(*budget_, client) {}
 
-    [[nodiscard]] bool Grow(uint64_t bytes) { return share_.Grow(bytes); }
+    [[nodiscard]] ByteBudget::Growth Grow(uint64_t bytes) { return share_.Grow(bytes); }
     void ShrinkTo(uint64_t bytes) { share_.ShrinkTo(bytes); }
 
    private:

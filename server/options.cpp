@@ -144,6 +144,8 @@ void AddLimitFlags(CLI::App& app, Options& options) {
       "--max-cache-bytes", limits.max_cache_bytes,
       "Bytes of all particle sets kept in memory, and as many again of all uploads in progress or "
       "broken off");
+  bytes("--max-client-upload-bytes", limits.max_client_upload_bytes,
+        "Bytes of one client's uploads in progress or broken off");
   bytes("--max-cache-dir-bytes", limits.max_cache_dir_bytes, "Bytes of all particle sets on disk")
       ->needs(cache_dir);
   number("--max-partial-uploads", limits.max_partial_uploads,
@@ -172,6 +174,8 @@ void AddLimitFlags(CLI::App& app, Options& options) {
   number("--max-client-frames", limits.max_client_frames, "Of these, frames of one client");
   bytes("--max-frame-bytes", limits.max_frame_bytes,
         "Pixels and files of all frames from when they are accepted until they are sent");
+  bytes("--max-client-frame-bytes", limits.max_client_frame_bytes,
+        "Of these, those of one client's frames");
   number("--max-frame-seconds", limits.max_frame_seconds,
          "How long a frame may take once its rendering has begun, without what it waits for other "
          "frames meanwhile; 0: no limit");
@@ -262,10 +266,16 @@ absl::Status Check(const Options& options) {
   checks.InRange("--max-stall-seconds", limits.max_stall_seconds, {.low = 0.0, .high = 86400.0});
   checks.InRange("--max-calls", limits.max_calls, {.low = 1.0, .high = 1e6});
   checks.InRange("--max-client-calls", limits.max_client_calls, {.low = 1.0, .high = 1e6});
-  if (limits.max_frame_bytes < limits.max_output_bytes) {
-    checks.Reject("--max-frame-bytes", fmt::format("{}", limits.max_frame_bytes),
-                  fmt::format("at least --max-output-bytes, {}", limits.max_output_bytes));
-  }
+  // What one frame or one set may take must find room.
+  const auto at_least = [&](const char* flag, uint64_t value, const char* of, uint64_t one) {
+    if (value < one) {
+      checks.Reject(flag, fmt::format("{}", value), fmt::format("at least {}, {}", of, one));
+    }
+  };
+  at_least("--max-frame-bytes", limits.max_frame_bytes, "--max-output-bytes",
+           limits.max_output_bytes);
+  at_least("--max-client-frame-bytes", limits.max_client_frame_bytes, "--max-output-bytes",
+           limits.max_output_bytes);
   // Room for a chunk of 64 KiB, the smallest that particles.proto recommends, and what is round it.
   checks.InRange("--max-reference-work", limits.max_reference_work, {.low = 0.0});
   checks.InRange("--max-message-bytes", limits.max_message_bytes,
@@ -277,17 +287,17 @@ absl::Status Check(const Options& options) {
                  {.low = 1.0, .high = 3600.0});
   checks.InRange("--max-idle-seconds", limits.max_idle_seconds, {.low = 1.0, .high = 86400.0});
   checks.InRange("--max-particle-bytes", limits.max_particle_bytes, {.low = 1.0});
-  if (limits.max_cache_bytes < limits.max_particle_bytes) {
-    checks.Reject("--max-cache-bytes", fmt::format("{}", limits.max_cache_bytes),
-                  fmt::format("at least --max-particle-bytes, {}", limits.max_particle_bytes));
-  }
+  at_least("--max-cache-bytes", limits.max_cache_bytes, "--max-particle-bytes",
+           limits.max_particle_bytes);
+  at_least("--max-client-upload-bytes", limits.max_client_upload_bytes, "--max-particle-bytes",
+           limits.max_particle_bytes);
   checks.InRange("--max-partial-uploads", limits.max_partial_uploads,
                  {.low = 0.0, .high = 65536.0});
   checks.InRange("--partial-upload-seconds", limits.partial_upload_seconds,
                  {.low = 0.0, .high = 86400.0 * 365.0});
-  if (!options.cache_dir.empty() && limits.max_cache_dir_bytes < limits.max_particle_bytes) {
-    checks.Reject("--max-cache-dir-bytes", fmt::format("{}", limits.max_cache_dir_bytes),
-                  fmt::format("at least --max-particle-bytes, {}", limits.max_particle_bytes));
+  if (!options.cache_dir.empty()) {
+    at_least("--max-cache-dir-bytes", limits.max_cache_dir_bytes, "--max-particle-bytes",
+             limits.max_particle_bytes);
   }
   return checks.status();
 }

@@ -84,16 +84,24 @@ void PartialUploads::Drop(const std::string& sha256) {
   }
 }
 
-bool PartialUploads::Grow(ByteBudget::Share& share, uint64_t bytes) {
-  while (!share.Grow(bytes)) {
-    Entries dropped;
-    const std::lock_guard lock(mutex_);
-    if (kept_.empty()) {
-      return false;
+ByteBudget::Growth PartialUploads::Grow(ByteBudget::Share& share, uint64_t bytes) {
+  using Growth = ByteBudget::Growth;
+  Growth growth = share.Grow(bytes);
+  while (growth != Growth::kDone) {
+    {
+      Entries dropped;
+      const std::lock_guard lock(mutex_);
+      const auto gives_way = std::find_if(kept_.rbegin(), kept_.rend(), [&](const Entry& entry) {
+        return growth == Growth::kFull || entry.upload->memory.client() == share.client();
+      });
+      if (gives_way == kept_.rend()) {
+        break;
+      }
+      dropped.splice(dropped.end(), kept_, std::prev(gives_way.base()));
     }
-    dropped.splice(dropped.end(), kept_, std::prev(kept_.end()));
+    growth = share.Grow(bytes);
   }
-  return true;
+  return growth;
 }
 
 void PartialUploads::DropExpired() {

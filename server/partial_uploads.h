@@ -16,6 +16,7 @@
 
 #include "halflight/v1/particles.pb.h"
 #include "server/byte_budget.h"
+#include "server/caller.h"
 #include "server/particle_assembler.h"
 
 namespace halflight {
@@ -24,11 +25,11 @@ namespace halflight {
 struct PartialUpload {
   // The header has been checked.
   PartialUpload(const v1::ParticleSetDescription& checked, ByteBudget& budget,
-                std::string uploader = "")
+                const Caller& uploader = {})
       : header(checked),
-        tenant(std::move(uploader)),
+        tenant(uploader.tenant),
         assembler(header.layout(), header.byte_size()),
-        memory(budget) {}
+        memory(budget, uploader.client()) {}
 
   v1::ParticleSetDescription header;
   std::string tenant;  // "" where nothing says who it is
@@ -69,8 +70,8 @@ class PartialUploads {
   void Drop(const std::string& sha256);
 
   // Grows a share of memory(), for which uploads that are kept make room, those that broke off
-  // first first. False where there is no room even so.
-  [[nodiscard]] bool Grow(ByteBudget::Share& share, uint64_t bytes);
+  // first first; where only its client has too much, that client's.
+  [[nodiscard]] ByteBudget::Growth Grow(ByteBudget::Share& share, uint64_t bytes);
 
   // Lets go of what is too old. Whatever is asked here looks at ages too: this is for when nobody
   // asks.

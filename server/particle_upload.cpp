@@ -13,8 +13,8 @@
 namespace halflight {
 
 ParticleUpload::ParticleUpload(ParticleStore& store, PartialUploads& partial,
-                               const ServerLimits& limits, std::string tenant)
-    : store_(store), partial_(partial), limits_(limits), tenant_(std::move(tenant)) {}
+                               const ServerLimits& limits, Caller caller)
+    : store_(store), partial_(partial), limits_(limits), caller_(std::move(caller)) {}
 
 ParticleUpload::~ParticleUpload() { Keep(); }
 
@@ -75,10 +75,10 @@ absl::Status ParticleUpload::Begin(const v1::ParticleSetDescription& header) {
     return room;
   }
   if (header.resume_offset() == 0) {
-    upload_ = std::make_unique<PartialUpload>(header, partial_.memory(), tenant_);
+    upload_ = std::make_unique<PartialUpload>(header, partial_.memory(), caller_);
     return absl::OkStatus();
   }
-  auto kept = partial_.Take(header, tenant_);
+  auto kept = partial_.Take(header, caller_.tenant);
   if (!kept.ok()) {
     return kept.status();
   }
@@ -110,12 +110,13 @@ absl::Status ParticleUpload::Append(std::string_view bytes) {
   // What is there already, where the client resumes before the end of what is kept.
   bytes.remove_prefix(std::min<uint64_t>(bytes.size(), assembler.received_bytes() - begin));
   // An upload never holds more than the payload, whatever is sent: the assembler refuses the rest.
-  if (assembler.received_bytes() + bytes.size() <= assembler.payload_bytes() &&
-      !partial_.Grow(upload_->memory, bytes.size())) {
-    return BusyError(v1::ERROR_REASON_UPLOAD_MEMORY_FULL,
-                     fmt::format("{} bytes more", bytes.size()),
-                     fmt::format("{} bytes for all uploads in progress, of which {} are left",
-                                 partial_.memory().total(), partial_.memory().left()));
+  if (assembler.received_bytes() + bytes.size() <= assembler.payload_bytes()) {
+    const auto growth = partial_.Grow(upload_->memory, bytes.size());
+    if (growth != ByteBudget::Growth::kDone) {
+      return BusyError(v1::ERROR_REASON_UPLOAD_MEMORY_FULL,
+                       fmt::format("{} bytes more", bytes.size()),
+                       partial_.memory().Allowed(growth, "uploads in progress"));
+    }
   }
   return assembler.Append(bytes);
 }

@@ -12,6 +12,7 @@
 #include "absl/status/statusor.h"
 #include "halflight/v1/particles.pb.h"
 #include "halflight/v1/scene.pb.h"
+#include "server/caller.h"
 #include "server/limits.h"
 #include "server/partial_uploads.h"
 #include "server/particle_assembler.h"
@@ -23,10 +24,10 @@ namespace halflight {
 // until one of them commits.
 class ParticleUpload {
  public:
-  // What breaks off is kept in `partial` for `tenant`, and goes on from there when the header asks
-  // for it.
+  // What breaks off is kept in `partial` for the caller's tenant, and goes on from there when the
+  // header asks for it.
   ParticleUpload(ParticleStore& store, PartialUploads& partial, const ServerLimits& limits,
-                 std::string tenant = "");
+                 Caller caller = {});
   // As if the stream had ended.
   ~ParticleUpload();
   ParticleUpload(const ParticleUpload&) = delete;
@@ -59,7 +60,7 @@ class ParticleUpload {
   ParticleStore& store_;
   PartialUploads& partial_;
   const ServerLimits& limits_;
-  const std::string tenant_;
+  const Caller caller_;
   std::unique_ptr<PartialUpload> upload_;  // from the header until the upload is over
   uint64_t at_ = 0;                        // where in the payload the next chunk begins
   bool over_ = false;

@@ -15,6 +15,7 @@ v1::GetServerInfoResponse GetServerInfo(const Backend& backend) {
   told.set_max_particles(limits.max_particles);
   told.set_max_particle_bytes(limits.max_particle_bytes);
   told.set_max_cache_bytes(limits.max_cache_bytes);
+  told.set_max_client_upload_bytes(limits.max_client_upload_bytes);
   told.set_max_image_size(limits.max_image_size);
   told.set_max_light_buffer_size(limits.max_light_buffer_size);
   told.set_max_slices(limits.max_slices);
@@ -26,6 +27,7 @@ v1::GetServerInfoResponse GetServerInfo(const Backend& backend) {
   told.set_max_queued_frames(limits.max_queued_frames);
   told.set_max_client_frames(limits.max_client_frames);
   told.set_max_frame_bytes(limits.max_frame_bytes);
+  told.set_max_client_frame_bytes(limits.max_client_frame_bytes);
   told.set_max_frame_seconds(limits.max_frame_seconds);
   told.set_max_stall_seconds(limits.max_stall_seconds);
   told.set_max_calls(limits.max_calls);

@@ -6,7 +6,7 @@ namespace halflight {
 
 UploadParticlesHandler::UploadParticlesHandler(const Backend& backend, const Caller& caller)
     : metrics_(backend.metrics),
-      upload_(backend.store, backend.partial_uploads, backend.limits, caller.tenant) {}
+      upload_(backend.store, backend.partial_uploads, backend.limits, caller) {}
 
 std::optional<UploadParticlesHandler::Answer> UploadParticlesHandler::OnRequest(
     const v1::UploadParticlesRequest& request) {

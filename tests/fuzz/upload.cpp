@@ -30,6 +30,7 @@ constexpr size_t kClients = 2;
 constexpr int kMaxSteps = 64;
 constexpr uint64_t kStoreBytes = 150;  // of sets of 12 to 96 bytes
 constexpr uint64_t kMemoryBytes = 200;
+constexpr uint64_t kClientBytes = 120;
 
 struct NamedSet {
   v1::InlineParticles particles;
@@ -99,7 +100,7 @@ class Server {
     const auto first = step == 0 || step == 4 || step == 6 || step == 7 ? uint8_t{0} : input.Byte();
     switch (step) {
       case 0:
-        streams_[client].emplace(store_, partial_, limits_);
+        streams_[client].emplace(store_, partial_, limits_, Caller{.peer = std::to_string(client)});
         at_[client] = 0;
         break;
       case 1:
@@ -275,7 +276,7 @@ class Server {
   const std::chrono::seconds partial_age_{100};
   PartialUploadOptions::Time now_{};
   ParticleStore store_{kStoreBytes};
-  ByteBudget memory_{kMemoryBytes};
+  ByteBudget memory_{kMemoryBytes, kClientBytes};
   PartialUploads partial_{
       memory_, {.max_count = 2, .max_age = partial_age_, .now = [this] { return now_; }}};
   std::array<std::optional<ParticleUpload>, kClients> streams_;

@@ -170,6 +170,25 @@ TEST_F(Pipeline, MemoryOfAFrameIsHeldUntilItIsLetGo) {
   EXPECT_TRUE(Submit(job).get().ok());
 }
 
+TEST_F(Pipeline, ClientThatKeepsItsFramesTakesNobodyElsesMemory) {
+  FrameJob job = MustConvert();
+  Start({.admission = {.max_frame_bytes = job.pixel_bytes * 3,
+                       .max_client_frame_bytes = job.pixel_bytes * 3 / 2},
+         .encode = EncodePlain});
+  job.caller.tenant = "slow reader";
+  Result first = Submit(job).get();
+  ASSERT_TRUE(first.ok());
+  const Result refused = Submit(job).get();
+  EXPECT_EQ(DetailOf(refused.status()).reason, v1::ERROR_REASON_FRAME_MEMORY_FULL);
+  EXPECT_THAT(std::string(refused.status().message()), HasSubstr("of one client"));
+  EXPECT_TRUE(DetailOf(refused.status()).retry_after.has_value());
+  FrameJob others = job;
+  others.caller.tenant = "other";
+  EXPECT_TRUE(Submit(others).get().ok());
+  *first = nullptr;
+  EXPECT_TRUE(Submit(job).get().ok());
+}
+
 TEST_F(Pipeline, EncodedFrameCountsWithItsBytesAlone) {
   const FrameJob job = MustConvert();
   Start({.admission = {.max_frame_bytes = job.pixel_bytes * 3 / 2},

@@ -158,6 +158,8 @@ TEST(Options, HelpNamesEveryFlagAndRunsNothing) {
                            "--partial-upload-seconds",
                            "--max-client-frames",
                            "--max-frame-bytes",
+                           "--max-client-frame-bytes",
+                           "--max-client-upload-bytes",
                            "--max-frame-seconds",
                            "--max-stall-seconds",
                            "--max-calls",
@@ -188,6 +190,11 @@ TEST(Options, ErrorsNameFlagValueAndWhatIsAllowed) {
   EXPECT_THAT(ErrorOf({"--max-queued-frames", "-3"}), HasSubstr("--max-queued-frames"));
   EXPECT_THAT(ErrorOf({"--max-cache-bytes", "1MiB", "--max-particle-bytes", "2MiB"}),
               HasSubstr("--max-cache-bytes: 1048576, allowed: at least --max-particle-bytes"));
+  EXPECT_THAT(
+      ErrorOf({"--max-client-upload-bytes", "1MiB", "--max-particle-bytes", "2MiB"}),
+      HasSubstr("--max-client-upload-bytes: 1048576, allowed: at least --max-particle-bytes"));
+  EXPECT_THAT(ErrorOf({"--max-client-frame-bytes", "1MiB"}),
+              HasSubstr("--max-client-frame-bytes: 1048576, allowed: at least --max-output-bytes"));
   EXPECT_THAT(ErrorOf({"--max-cache-bytes", "-1"}), HasSubstr("--max-cache-bytes: -1, allowed: "));
   EXPECT_THAT(ErrorOf({"--cache-dir", "/c", "--max-cache-dir-bytes", "1MiB"}),
               HasSubstr("--max-cache-dir-bytes: 1048576, allowed: at least --max-particle-bytes"));

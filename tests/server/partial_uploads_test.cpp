@@ -13,6 +13,7 @@
 namespace halflight {
 namespace {
 
+using Growth = ByteBudget::Growth;
 using std::chrono::seconds;
 using testing::Describe;
 using testing::MakeParticles;
@@ -28,8 +29,8 @@ class Partial : public ::testing::Test {
   std::unique_ptr<PartialUpload> Begun(int particles, uint64_t bytes,
                                        const std::string& tenant = "") {
     const v1::InlineParticles set = SetOf(particles);
-    auto upload = std::make_unique<PartialUpload>(Describe(set), memory_, tenant);
-    EXPECT_TRUE(upload->memory.Grow(bytes));
+    auto upload = std::make_unique<PartialUpload>(Describe(set), memory_, Caller{tenant});
+    EXPECT_EQ(upload->memory.Grow(bytes), Growth::kDone);
     EXPECT_TRUE(upload->assembler.Append(set.payload().substr(0, bytes)).ok());
     return upload;
   }
@@ -111,14 +112,37 @@ TEST_F(Partial, WhatIsKeptMakesRoomForWhatIsUnderWay) {
   uploads_.Keep(Begun(200, 2000));
   uploads_.Keep(Begun(300, 3000));
   ByteBudget::Share under_way(memory_);
-  ASSERT_TRUE(uploads_.Grow(under_way, 5000));
+  ASSERT_EQ(uploads_.Grow(under_way, 5000), Growth::kDone);
   EXPECT_EQ(memory_.left(), 0U);
-  ASSERT_TRUE(uploads_.Grow(under_way, 1));
+  ASSERT_EQ(uploads_.Grow(under_way, 1), Growth::kDone);
   EXPECT_EQ(uploads_.CommittedBytes(NameOf(200)), 0U);
   EXPECT_EQ(uploads_.CommittedBytes(NameOf(300)), 3000U);
-  EXPECT_FALSE(uploads_.Grow(under_way, 5000)) << "more than there is";
-  ASSERT_TRUE(uploads_.Grow(under_way, 4999));
+  EXPECT_EQ(uploads_.Grow(under_way, 5000), Growth::kFull) << "more than there is";
+  ASSERT_EQ(uploads_.Grow(under_way, 4999), Growth::kDone);
   EXPECT_EQ(memory_.left(), 0U);
+}
+
+TEST_F(Partial, ClientWithTooMuchTakesNobodyElsesRoom) {
+  ByteBudget memory(10000, 4000);
+  PartialUploads uploads(memory, Options());
+  const auto keep = [&](int particles, uint64_t bytes, const std::string& tenant) {
+    auto upload =
+        std::make_unique<PartialUpload>(Describe(SetOf(particles)), memory, Caller{tenant});
+    ASSERT_EQ(uploads.Grow(upload->memory, bytes), Growth::kDone);
+    ASSERT_TRUE(upload->assembler.Append(SetOf(particles).payload().substr(0, bytes)).ok());
+    uploads.Keep(std::move(upload));
+  };
+  keep(300, 3000, "other");
+  keep(250, 3000, "another");
+  keep(200, 2000, "greedy");
+  ByteBudget::Share under_way(memory, Caller{"greedy"}.client());
+  ASSERT_EQ(uploads.Grow(under_way, 2000), Growth::kDone);
+  ASSERT_EQ(memory.left(), 0U);
+  EXPECT_EQ(uploads.Grow(under_way, 2001), Growth::kClientFull);
+  EXPECT_EQ(uploads.CommittedBytes(NameOf(200), "greedy"), 0U) << "its own gives way";
+  EXPECT_EQ(uploads.CommittedBytes(NameOf(300), "other"), 3000U);
+  ASSERT_EQ(uploads.Grow(under_way, 2000), Growth::kDone);
+  EXPECT_EQ(memory.left(), 0U);
 }
 
 TEST_F(Partial, NothingIsKeptOfNothingOrWhereNothingIsToBeKept) {
@@ -149,7 +173,7 @@ TEST_F(Partial, ManyThreadsAtOnceLoseNoMemory) {
             }
           }
           if (upload->assembler.received_bytes() + 12 <= header.byte_size() &&
-              uploads.Grow(upload->memory, 12)) {
+              uploads.Grow(upload->memory, 12) == Growth::kDone) {
             ASSERT_TRUE(upload->assembler.Append(std::string(12, '\0')).ok());
           }
           if (i % 7 == 0) {

@@ -8,6 +8,8 @@
 
 #include <gtest/gtest.h>
 
+#include "server/error_detail.h"
+
 namespace halflight {
 namespace {
 
@@ -60,7 +62,10 @@ TEST(ParticleStore, SetsInUseStayAndOthersGoForThem) {
   EXPECT_TRUE(store.Touch("a")) << "though it was used longest ago";
   EXPECT_FALSE(store.Touch("b"));
   const auto also_used = store.Find("c");
-  EXPECT_EQ(store.CheckRoom(1).code(), absl::StatusCode::kResourceExhausted);
+  const absl::Status full = store.CheckRoom(1);
+  EXPECT_EQ(full.code(), absl::StatusCode::kResourceExhausted);
+  EXPECT_EQ(DetailOf(full).reason, v1::ERROR_REASON_CACHE_FULL);
+  EXPECT_TRUE(DetailOf(full).retry_after.has_value());
   EXPECT_EQ(store.Insert("d", SetOf(1)).code(), absl::StatusCode::kResourceExhausted);
   EXPECT_FALSE(store.Touch("d"));
   EXPECT_TRUE(store.Insert("c", SetOf(10)).ok()) << "it is there";

@@ -11,6 +11,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "server/error_detail.h"
 #include "tests/server/made_particles.h"
 #include "tests/server/upload_messages.h"
 
@@ -180,6 +181,24 @@ TEST_F(Upload, CountOverTheLimitsIsRefusedBeforeAnyBody) {
   EXPECT_EQ(Send({Header(header_)}).code(), absl::StatusCode::kInvalidArgument);
 }
 
+TEST_F(Upload, OneClientsUploadsLeaveRoomForOthers) {
+  ByteBudget small(4000, 3000);
+  PartialUploads partial(small, {});
+  const std::string& bytes = particles_.payload();
+  ParticleUpload greedy(store_, partial, limits_, {.peer = "ipv4:192.0.2.1:1000"});
+  ASSERT_TRUE(greedy.Receive(Header(header_)).ok());
+  ASSERT_TRUE(greedy.Receive(Chunk(bytes.substr(0, 3000))).ok());
+  ParticleUpload other(store_, partial, limits_, {.peer = "ipv4:192.0.2.2:1000"});
+  ASSERT_TRUE(other.Receive(Header(header_)).ok());
+  ParticleUpload again(store_, partial, limits_, {.peer = "ipv4:192.0.2.1:1001"});
+  ASSERT_TRUE(again.Receive(Header(header_)).ok());
+  const absl::Status refused = again.Receive(Chunk(bytes.substr(0, 100)));
+  EXPECT_EQ(refused.code(), absl::StatusCode::kResourceExhausted);
+  EXPECT_EQ(DetailOf(refused).reason, v1::ERROR_REASON_UPLOAD_MEMORY_FULL);
+  EXPECT_TRUE(DetailOf(refused).retry_after.has_value());
+  EXPECT_TRUE(other.Receive(Chunk(bytes.substr(0, 1000))).ok());
+}
+
 TEST_F(Upload, AllUploadsTogetherStayWithinTheirMemory) {
   ByteBudget small(4000);
   PartialUploads partial(small, {});
@@ -191,8 +210,9 @@ TEST_F(Upload, AllUploadsTogetherStayWithinTheirMemory) {
   ParticleUpload second(store_, partial, limits_);
   ASSERT_TRUE(second.Receive(Header(Describe(others))).ok());
   ASSERT_TRUE(second.Receive(Chunk(others.payload().substr(0, 900))).ok());
-  EXPECT_EQ(second.Receive(Chunk(others.payload().substr(900))).code(),
-            absl::StatusCode::kResourceExhausted);
+  const absl::Status refused = second.Receive(Chunk(others.payload().substr(900)));
+  EXPECT_EQ(refused.code(), absl::StatusCode::kResourceExhausted);
+  EXPECT_EQ(DetailOf(refused).reason, v1::ERROR_REASON_UPLOAD_MEMORY_FULL);
   EXPECT_EQ(partial.CommittedBytes(Describe(others).sha256()), 900U) << "it is kept";
   EXPECT_EQ(small.left(), 100U);
   ASSERT_TRUE(first.Receive(Chunk(bytes.substr(3000))).ok()) << "what is kept makes room";

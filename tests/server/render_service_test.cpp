@@ -13,7 +13,6 @@
 #include <gtest/gtest.h>
 
 #include "halflight/crc32c.h"
-#include "halflight/particle_payload.h"
 #include "halflight/v1/service.grpc.pb.h"
 #include "server/grpc_server.h"
 #include "tests/process/wait_for.h"
@@ -23,10 +22,14 @@
 namespace halflight {
 namespace {
 
+using testing::Chunk;
+using testing::Describe;
 using ::testing::ElementsAre;
 using testing::EncodePlain;
 using testing::FakeEngine;
+using testing::Finish;
 using ::testing::HasSubstr;
+using testing::Header;
 using testing::MakeParticles;
 using testing::MakeRequest;
 using testing::WaitFor;
@@ -287,11 +290,9 @@ TEST_F(Service, SequenceCancelledInMidStreamEnds) {
 TEST_F(Service, UploadedSetIsFoundAndRendered) {
   const v1::InlineParticles particles =
       MakeParticles(1000, {v1::PARTICLE_ATTRIBUTE_POSITION, v1::PARTICLE_ATTRIBUTE_RADIUS});
-  Sha256 digest = BeginParticleDigest(particles.layout());
-  digest.Update(particles.payload());
-  const std::string sha256 = digest.Finish();
+  const v1::ParticleSetDescription header = Describe(particles);
   v1::FindMissingParticlesRequest question;
-  question.add_sha256(sha256);
+  question.add_sha256(header.sha256());
   {
     grpc::ClientContext context;
     v1::FindMissingParticlesResponse missing;
@@ -302,25 +303,47 @@ TEST_F(Service, UploadedSetIsFoundAndRendered) {
     grpc::ClientContext context;
     v1::UploadParticlesResponse response;
     auto writer = stub_->UploadParticles(&context, &response);
-    v1::UploadParticlesRequest part;
-    *part.mutable_header()->mutable_layout() = particles.layout();
-    part.mutable_header()->set_byte_size(particles.payload().size());
-    part.mutable_header()->set_sha256(sha256);
-    writer->Write(part);
-    part.set_chunk(particles.payload());
-    writer->Write(part);
-    part.mutable_finish()->set_byte_size(particles.payload().size());
-    part.mutable_finish()->set_sha256(sha256);
-    writer->Write(part);
+    writer->Write(Header(header));
+    writer->Write(Chunk(particles.payload()));
+    writer->Write(Finish(header));
     writer->WritesDone();
     const grpc::Status status = writer->Finish();
     ASSERT_TRUE(status.ok()) << status.error_message();
     EXPECT_EQ(response.already_present(), again);
   }
   v1::RenderFrameRequest request = MakeRequest();
-  request.mutable_scene()->set_particle_sha256(sha256);
+  request.mutable_scene()->set_particle_sha256(header.sha256());
   EXPECT_TRUE(RenderAll(request).ok());
   EXPECT_EQ(engine_.last_request().scene.particles->size(), 1000U);
+}
+
+TEST_F(Service, OneSetFromTwoClientsAtOnceIsCommittedOnceAndBothAreTold) {
+  const v1::InlineParticles particles = MakeParticles(1000, {v1::PARTICLE_ATTRIBUTE_POSITION});
+  const v1::ParticleSetDescription header = Describe(particles);
+  struct Upload {
+    grpc::ClientContext context;
+    v1::UploadParticlesResponse response;
+    std::unique_ptr<grpc::ClientWriter<v1::UploadParticlesRequest>> writer;
+  };
+  Upload uploads[2];
+  for (Upload& upload : uploads) {
+    upload.writer = stub_->UploadParticles(&upload.context, &upload.response);
+    ASSERT_TRUE(upload.writer->Write(Header(header)));
+    ASSERT_TRUE(upload.writer->Write(Chunk(particles.payload().substr(0, 5000))));
+  }
+  ASSERT_TRUE(WaitFor([this] { return upload_memory_.used() == 10000; }));
+  for (Upload& upload : uploads) {
+    // What the server has no more need of it does not read to its end.
+    upload.writer->Write(Chunk(particles.payload().substr(5000)));
+    upload.writer->Write(Finish(header));
+    upload.writer->WritesDone();
+    const grpc::Status status = upload.writer->Finish();
+    ASSERT_TRUE(status.ok()) << status.error_message();
+  }
+  EXPECT_FALSE(uploads[0].response.already_present());
+  EXPECT_TRUE(uploads[1].response.already_present());
+  EXPECT_TRUE(store_.Touch(header.sha256()));
+  EXPECT_TRUE(WaitFor([this] { return upload_memory_.used() == 0; }));
 }
 
 TEST_F(Service, UploadWithAMessageThatCannotBeReadIsNeverWellAndCommitsNothing) {
