@@ -1,5 +1,7 @@
 #include "server/frame_admission.h"
 
+#include <algorithm>
+
 #include <fmt/format.h>
 
 #include "server/error_detail.h"
@@ -12,18 +14,28 @@ FrameAdmission::FrameAdmission(const AdmissionLimits& limits)
 }
 
 absl::StatusOr<std::shared_ptr<FrameAdmission::Memory>> FrameAdmission::Admit(
-    const std::string& client, uint64_t bytes) {
+    const std::string& client, uint64_t bytes, const PinnedSet& set) {
   auto memory = std::make_shared<Memory>(memory_, client);
   const std::lock_guard lock(mutex_);
   if (absl::Status place = FindPlace(client); !place.ok()) {
     return place;
   }
-  if (const auto growth = memory->Grow(bytes); growth != ByteBudget::Growth::kDone) {
+  if (const uint64_t pinned = pinned_.BytesWith(client, set);
+      pinned > limits_.max_client_set_bytes) {
+    return BusyError(
+        v1::ERROR_REASON_CACHE_FULL,
+        fmt::format("{} bytes of sets with those that this client's frames need", pinned),
+        fmt::format("{} bytes for the sets of one client's frames", limits_.max_client_set_bytes));
+  }
+  const auto growth =
+      memory->Grow(std::min({bytes, limits_.max_frame_bytes, limits_.max_client_frame_bytes}));
+  if (growth != ByteBudget::Growth::kDone) {
     return BusyError(v1::ERROR_REASON_FRAME_MEMORY_FULL,
                      fmt::format("the frame takes up to {} bytes", bytes),
                      memory_->Allowed(growth, "frames"));
   }
   queued_.Add(client);
+  pinned_.Pin(client, set);
   ++under_way_;
   ++accepted_;
   return memory;
@@ -49,9 +61,10 @@ absl::Status FrameAdmission::FindPlace(const std::string& client) const {
   return absl::OkStatus();
 }
 
-void FrameAdmission::OnEncoded(const std::string& client) {
+void FrameAdmission::OnEncoded(const std::string& client, const PinnedSet& set) {
   const std::lock_guard lock(mutex_);
   queued_.Remove(client);
+  pinned_.Unpin(client, set);
 }
 
 void FrameAdmission::OnEnded() {

@@ -14,6 +14,7 @@
 #include "absl/status/statusor.h"
 #include "server/byte_budget.h"
 #include "server/client_counts.h"
+#include "server/pinned_sets.h"
 
 namespace halflight {
 
@@ -24,6 +25,8 @@ struct AdmissionLimits {
   uint64_t max_frame_bytes = std::numeric_limits<uint64_t>::max();
   // Of these, of one client.
   uint64_t max_client_frame_bytes = std::numeric_limits<uint64_t>::max();
+  // Of the particle sets that frames of one client need, until they are encoded.
+  uint64_t max_client_set_bytes = std::numeric_limits<uint64_t>::max();
 };
 
 // All calls: any thread.
@@ -47,10 +50,12 @@ class FrameAdmission {
 
   // Whether a frame of this client would find a place now: ResourceExhausted as from Admit.
   [[nodiscard]] absl::Status PlaceFor(const std::string& client) const;
-  // A frame that takes up to so much memory. ResourceExhausted with reason and retry hint.
-  absl::StatusOr<std::shared_ptr<Memory>> Admit(const std::string& client, uint64_t bytes);
+  // A frame that takes up to so much memory: one that takes more than there is for a client is let
+  // in once that has nothing else. ResourceExhausted with reason and retry hint.
+  absl::StatusOr<std::shared_ptr<Memory>> Admit(const std::string& client, uint64_t bytes,
+                                                const PinnedSet& set);
   // Once for each that was let in: it is encoded, or has failed, and leaves its place to another.
-  void OnEncoded(const std::string& client);
+  void OnEncoded(const std::string& client, const PinnedSet& set);
   // Then once: nothing is done for it any more.
   void OnEnded();
   // Until every frame that was let in has ended.
@@ -72,6 +77,7 @@ class FrameAdmission {
   mutable std::mutex mutex_;
   std::condition_variable ended_;
   ClientCounts queued_;
+  PinnedSets pinned_;
   uint32_t under_way_ = 0;
   uint64_t accepted_ = 0;
 };

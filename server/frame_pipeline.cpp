@@ -55,6 +55,10 @@ double QueueMilliseconds(const FrameResult& result) {
   return waited;
 }
 
+PinnedSet SetOf(const FrameJob& job) {
+  return {job.particle_sha256, MemoryBytes(*job.request.scene.particles)};
+}
+
 }  // namespace
 
 // Everything that flows between the stages of one frame. Each stage writes its own part; the last
@@ -108,7 +112,7 @@ void FramePipeline::WarmUp() {
 }
 
 absl::Status FramePipeline::Submit(FrameJob job, std::stop_token stop, Done done) {
-  auto memory = admission_.Admit(job.caller.client(), job.pixel_bytes);
+  auto memory = admission_.Admit(job.caller.client(), job.pixel_bytes, SetOf(job));
   if (!memory.ok()) {
     return memory.status();
   }
@@ -375,7 +379,7 @@ void FramePipeline::Complete(const FlightPtr& flight) {
   flight->frame = {};
   flight->images.clear();
   flight->memory.reset();
-  admission_.OnEncoded(flight->job.caller.client());
+  admission_.OnEncoded(flight->job.caller.client(), SetOf(flight->job));
   std::exchange(flight->done, nullptr)(std::move(answer));
   admission_.OnEnded();
 }

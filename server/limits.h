@@ -16,6 +16,7 @@ struct ServerLimits {
   uint64_t max_particles = 50'000'000;
   uint64_t max_particle_bytes = 1 * kGiB;
   uint64_t max_cache_bytes = 4 * kGiB;  // also bounds what all uploads in progress hold together
+  uint64_t max_client_set_bytes = 3 * kGiB;  // of sets that frames of one client need
   uint64_t max_client_upload_bytes = 3 * kGiB;
   uint32_t max_image_size = 8192;
   uint32_t max_light_buffer_size = 4096;

@@ -63,7 +63,8 @@ PipelineOptions PipelineOptionsOf(const Options& options, const ServerLimits& li
   PipelineOptions pipeline{.admission = {.max_queued_frames = limits.max_queued_frames,
                                          .max_client_frames = limits.max_client_frames,
                                          .max_frame_bytes = limits.max_frame_bytes,
-                                         .max_client_frame_bytes = limits.max_client_frame_bytes},
+                                         .max_client_frame_bytes = limits.max_client_frame_bytes,
+                                         .max_client_set_bytes = limits.max_client_set_bytes},
                            .encode_threads = options.encode_threads,
                            .warm_up = true,
                            .metrics = &metrics,
@@ -139,8 +140,9 @@ int Run(const Options& options, std::vector<ListeningSocket> inherited, const si
     }
     files = *std::move(opened);
   }
-  ParticleStore store(limits.max_cache_bytes, std::move(files));
+  // Before the store, whose threads may be the last to hold a call.
   ByteBudget upload_memory(limits.max_cache_bytes, limits.max_client_upload_bytes);
+  ParticleStore store(limits.max_cache_bytes, std::move(files));
   PartialUploads partial_uploads(upload_memory,
                                  {.max_count = limits.max_partial_uploads,
                                   .max_age = std::chrono::seconds(limits.partial_upload_seconds)});

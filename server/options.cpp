@@ -144,6 +144,8 @@ void AddLimitFlags(CLI::App& app, Options& options) {
       "--max-cache-bytes", limits.max_cache_bytes,
       "Bytes of all particle sets kept in memory, and as many again of all uploads in progress or "
       "broken off");
+  bytes("--max-client-set-bytes", limits.max_client_set_bytes,
+        "Of these, those of sets that one client's frames need");
   bytes("--max-client-upload-bytes", limits.max_client_upload_bytes,
         "Bytes of one client's uploads in progress or broken off");
   bytes("--max-cache-dir-bytes", limits.max_cache_dir_bytes, "Bytes of all particle sets on disk")
@@ -288,6 +290,8 @@ absl::Status Check(const Options& options) {
   checks.InRange("--max-idle-seconds", limits.max_idle_seconds, {.low = 1.0, .high = 86400.0});
   checks.InRange("--max-particle-bytes", limits.max_particle_bytes, {.low = 1.0});
   at_least("--max-cache-bytes", limits.max_cache_bytes, "--max-particle-bytes",
+           limits.max_particle_bytes);
+  at_least("--max-client-set-bytes", limits.max_client_set_bytes, "--max-particle-bytes",
            limits.max_particle_bytes);
   at_least("--max-client-upload-bytes", limits.max_client_upload_bytes, "--max-particle-bytes",
            limits.max_particle_bytes);

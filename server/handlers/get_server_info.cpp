@@ -15,6 +15,7 @@ v1::GetServerInfoResponse GetServerInfo(const Backend& backend) {
   told.set_max_particles(limits.max_particles);
   told.set_max_particle_bytes(limits.max_particle_bytes);
   told.set_max_cache_bytes(limits.max_cache_bytes);
+  told.set_max_client_set_bytes(limits.max_client_set_bytes);
   told.set_max_client_upload_bytes(limits.max_client_upload_bytes);
   told.set_max_image_size(limits.max_image_size);
   told.set_max_light_buffer_size(limits.max_light_buffer_size);

@@ -189,6 +189,43 @@ TEST_F(Pipeline, ClientThatKeepsItsFramesTakesNobodyElsesMemory) {
   EXPECT_TRUE(Submit(job).get().ok());
 }
 
+TEST_F(Pipeline, FrameThatTakesMoreThanThereIsComesAlone) {
+  const FrameJob job = MustConvert();
+  Start({.admission = {.max_frame_bytes = job.pixel_bytes / 2}, .encode = EncodePlain});
+  engine_.SetGate(false);
+  auto first = Submit(job);
+  EXPECT_EQ(DetailOf(Submit(job).get().status()).reason, v1::ERROR_REASON_FRAME_MEMORY_FULL);
+  engine_.SetGate(true);
+  EXPECT_TRUE(first.get().ok());
+}
+
+TEST_F(Pipeline, ClientsFramesPinSoMuchOfTheirSetsAndLeaveRoomForOthers) {
+  FrameJob job = MustConvert();
+  const uint64_t bytes = MemoryBytes(*job.request.scene.particles);
+  ASSERT_GT(bytes, 0U);
+  Start({.admission = {.max_client_set_bytes = 2 * bytes}, .encode = EncodePlain});
+  engine_.SetGate(false);
+  const auto frame_of = [&](const std::string& tenant, const std::string& set) {
+    job.caller.tenant = tenant;
+    job.particle_sha256 = set;
+    return Submit(job);
+  };
+  std::vector<std::future<Result>> let_in;
+  for (const char* set : {"a", "b", "b", "a"}) {
+    let_in.push_back(frame_of("greedy", set));
+  }
+  const Result refused = frame_of("greedy", "c").get();
+  EXPECT_EQ(DetailOf(refused.status()).reason, v1::ERROR_REASON_CACHE_FULL);
+  EXPECT_TRUE(DetailOf(refused.status()).retry_after.has_value());
+  let_in.push_back(frame_of("other", "c"));
+  engine_.SetGate(true);
+  for (auto& frame : let_in) {
+    EXPECT_TRUE(frame.get().ok());
+  }
+  EXPECT_TRUE(frame_of("greedy", "c").get().ok());
+  EXPECT_TRUE(frame_of("greedy", "d").get().ok());
+}
+
 TEST_F(Pipeline, EncodedFrameCountsWithItsBytesAlone) {
   const FrameJob job = MustConvert();
   Start({.admission = {.max_frame_bytes = job.pixel_bytes * 3 / 2},

@@ -160,6 +160,7 @@ TEST(Options, HelpNamesEveryFlagAndRunsNothing) {
                            "--max-frame-bytes",
                            "--max-client-frame-bytes",
                            "--max-client-upload-bytes",
+                           "--max-client-set-bytes",
                            "--max-frame-seconds",
                            "--max-stall-seconds",
                            "--max-calls",

@@ -1,0 +1,58 @@
+// Which particle sets the frames of each client keep in memory, and how much that is.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <string>
+#include <utility>
+
+namespace halflight {
+
+// A set as a frame needs it.
+struct PinnedSet {
+  std::string sha256;
+  uint64_t bytes = 0;
+};
+
+// Whoever uses it locks it.
+class PinnedSets {
+ public:
+  // Bytes of the sets that a client would pin with one more frame that needs this one: each counts
+  // once, however many frames need it.
+  [[nodiscard]] uint64_t BytesWith(const std::string& client, const PinnedSet& set) const {
+    uint64_t bytes = 0;
+    if (const auto own = of_.find(client); own != of_.end()) {
+      for (const auto& [sha256, pins] : own->second) {
+        bytes += sha256 == set.sha256 ? 0 : pins.bytes;
+      }
+    }
+    return bytes + set.bytes;
+  }
+
+  void Pin(const std::string& client, const PinnedSet& set) {
+    Pins& pins = of_[client][set.sha256];
+    pins.bytes = set.bytes;
+    ++pins.frames;
+  }
+  // One that was pinned.
+  void Unpin(const std::string& client, const PinnedSet& set) {
+    const auto own = of_.find(client);
+    const auto pins = own->second.find(set.sha256);
+    if (--pins->second.frames == 0) {
+      own->second.erase(pins);
+    }
+    if (own->second.empty()) {
+      of_.erase(own);
+    }
+  }
+
+ private:
+  struct Pins {
+    uint64_t bytes = 0;
+    size_t frames = 0;
+  };
+  std::map<std::string, std::map<std::string, Pins>> of_;  // no client or set without frames
+};
+
+}  // namespace halflight
