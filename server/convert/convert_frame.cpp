@@ -43,6 +43,18 @@ std::string FingerprintOf(const v1::RenderFrameRequest& request, const NamedPart
   return Sha256Of(made_from.SerializeAsString());
 }
 
+uint64_t HeldBytes(const FrameJob& job, uint64_t output_bytes) {
+  uint64_t bytes = output_bytes;
+  const OutputJob beauty{.shown = {ImageKind::kBeauty}};
+  const bool shown =
+      std::any_of(job.outputs.begin(), job.outputs.end(),
+                  [&](const OutputJob& output) { return output.shown.kind == beauty.shown.kind; });
+  if (job.measure.has_value() && (job.measure->without_scattering || !shown)) {
+    bytes += PixelBytes({beauty}, job.request.scene);
+  }
+  return job.target.has_value() ? 2 * bytes : bytes;
+}
+
 }  // namespace
 
 absl::StatusOr<NamedParticles> ResolveParticles(const v1::Scene& scene, ParticleStore& store,
@@ -109,7 +121,7 @@ absl::StatusOr<FrameJob> ConvertFrame(const v1::RenderFrameRequest& request,
     // What a search learns of costs shall hold for frames that nothing went before.
     job.request.reuse = !request.has_target();
     job.outputs = std::move(plan.outputs);
-    job.pixel_bytes = plan.pixel_bytes;
+    job.pixel_bytes = HeldBytes(job, plan.pixel_bytes);
   }
   if (!checks.ok()) {
     return checks.status();

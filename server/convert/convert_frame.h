@@ -32,7 +32,9 @@ struct FrameJob {
   std::optional<MeasureJob> measure;
   // Where it is set, the request's shadow and sampling are where its choice starts from.
   std::optional<TargetJob> target;
-  uint64_t pixel_bytes = 0;  // of all outputs together, in 32-bit float, at most
+  // Of all that is held for it at once, in 32-bit float, at most: its outputs, a picture that is
+  // drawn to be measured, and what a search may yet return.
+  uint64_t pixel_bytes = 0;
 };
 
 // The particles that a scene names or carries. InvalidArgument; NotFound for a name that the store

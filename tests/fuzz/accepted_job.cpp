@@ -98,8 +98,10 @@ void CheckShadow(const ShadowSettings& shadow, const ServerLimits& limits) {
 
 void CheckOutputs(const FrameJob& job, const ServerLimits& limits) {
   RequireWithin(static_cast<double>(job.outputs.size()), 1, limits.max_outputs, "outputs");
+  const auto& window = job.request.scene.camera.window;
+  const double picture = 16.0 * window.width * window.height;
   RequireWithin(static_cast<double>(job.pixel_bytes), 1,
-                static_cast<double>(limits.max_output_bytes), "pixel_bytes");
+                2 * (static_cast<double>(limits.max_output_bytes) + picture), "pixel_bytes");
   for (const OutputJob& output : job.outputs) {
     const bool error = output.shown.kind == ImageKind::kError;
     Require(error ? output.image == job.request.images.size()

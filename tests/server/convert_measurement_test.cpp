@@ -52,6 +52,22 @@ TEST(ConvertMeasurement, MeasuresABeautyThatNoOutputShows) {
   EXPECT_EQ(job.measure->sample->seed, uint64_t{1} << 63U);
 }
 
+TEST(ConvertMeasurement, PictureThatIsDrawnForItCounts) {
+  v1::RenderFrameRequest request = MakeRequest();
+  request.mutable_scene()->mutable_camera()->set_width(100);
+  request.mutable_scene()->mutable_camera()->set_height(10);
+  request.mutable_outputs(0)->set_kind(v1::OUTPUT_KIND_COVERAGE);
+  EXPECT_EQ(MustConvert(request).pixel_bytes, 4000U);
+  request.mutable_measure_error();
+  EXPECT_EQ(MustConvert(request).pixel_bytes, 4000U + 16000U);
+  request.mutable_outputs(0)->set_kind(v1::OUTPUT_KIND_BEAUTY);
+  EXPECT_EQ(MustConvert(request).pixel_bytes, 16000U) << "the one that is shown does";
+  request.mutable_scene()->mutable_material()->set_scattering_spread(0.5F);
+  EXPECT_EQ(MustConvert(request).pixel_bytes, 2 * 16000U);
+  request.mutable_target()->set_max_error(0.01F);
+  EXPECT_EQ(MustConvert(request).pixel_bytes, 4 * 16000U) << "of one attempt beside another";
+}
+
 TEST(ConvertMeasurement, PlacesTheErrorAfterAllThatIsRendered) {
   v1::RenderFrameRequest request = MakeRequest();
   request.mutable_outputs(0)->set_kind(v1::OUTPUT_KIND_ERROR);
