@@ -1,6 +1,8 @@
 #include "server/partial_uploads.h"
 
 #include <algorithm>
+#include <string_view>
+#include <unordered_map>
 #include <utility>
 
 #include <fmt/format.h>
@@ -68,8 +70,22 @@ void PartialUploads::Keep(std::unique_ptr<PartialUpload> upload) {
   }
   kept_.push_front({std::move(upload), options_.now()});
   if (kept_.size() > options_.max_count) {
-    dropped.splice(dropped.end(), kept_, std::prev(kept_.end()));
+    dropped.splice(dropped.end(), kept_, FirstOfWhoHasMost());
   }
+}
+
+// Under the mutex; there is one.
+PartialUploads::Entries::iterator PartialUploads::FirstOfWhoHasMost() {
+  std::unordered_map<std::string_view, size_t> counts;
+  for (const Entry& entry : kept_) {
+    ++counts[entry.upload->memory.client()];
+  }
+  const auto fewer = [](const auto& a, const auto& b) { return a.second < b.second; };
+  const size_t most = std::max_element(counts.begin(), counts.end(), fewer)->second;
+  const auto first = std::find_if(kept_.rbegin(), kept_.rend(), [&](const Entry& entry) {
+    return counts[entry.upload->memory.client()] == most;
+  });
+  return std::prev(first.base());
 }
 
 void PartialUploads::Drop(const std::string& sha256) {

@@ -64,6 +64,7 @@ class PartialUploads {
                                                       const std::string& tenant = "");
 
   // Keeps what an upload leaves. Of two of one name and tenant the one that got further stays.
+  // Beyond the count the first that broke off goes, of the client that has most.
   void Keep(std::unique_ptr<PartialUpload> upload);
 
   // The set is complete: nobody's need be kept.
@@ -90,6 +91,7 @@ class PartialUploads {
   // Under the mutex. Uploads hold up to gigabytes, which nobody should wait for to be freed: what
   // is let go is moved to `dropped`, to be freed after the mutex is.
   void Expire(Entries& dropped);
+  Entries::iterator FirstOfWhoHasMost();
   Entries::iterator Find(const std::string& sha256, const std::string& tenant);
 
   ByteBudget& memory_;

@@ -87,6 +87,17 @@ TEST_F(Partial, TooManyDropTheOneThatBrokeOffFirst) {
   EXPECT_EQ(memory_.left(), 10000U - 3 * 12);
 }
 
+TEST_F(Partial, ManyOfOneClientPushOutNobodyElses) {
+  uploads_.Keep(Begun(100, 500, "other"));
+  for (int particles : {101, 102, 103, 104}) {
+    uploads_.Keep(Begun(particles, 12, "greedy"));
+  }
+  EXPECT_EQ(uploads_.CommittedBytes(NameOf(100), "other"), 500U);
+  EXPECT_EQ(uploads_.CommittedBytes(NameOf(102), "greedy"), 0U);
+  EXPECT_EQ(uploads_.CommittedBytes(NameOf(103), "greedy"), 12U);
+  EXPECT_EQ(uploads_.count(), 3U);
+}
+
 TEST_F(Partial, OfTwoOfOneNameTheLongerStays) {
   uploads_.Keep(Begun(100, 500));
   uploads_.Keep(Begun(100, 300));
