@@ -17,6 +17,7 @@
 
 #include "absl/strings/escaping.h"
 #include "halflight/sha256.h"
+#include "server/error_detail.h"
 #include "server/log/log.h"
 #include "server/particle_file.h"
 #include "server/status_text.h"
@@ -297,7 +298,7 @@ void ParticleFiles::ReadNow(const std::string& sha256) {
       take_readers();
     }
   }
-  std::shared_ptr<const ParticleSet> set;
+  absl::StatusOr<std::shared_ptr<const ParticleSet>> set = nullptr;
   if (wanted) {
     set = ReadFile(sha256);
     const std::lock_guard lock(mutex_);
@@ -308,7 +309,8 @@ void ParticleFiles::ReadNow(const std::string& sha256) {
   }
 }
 
-std::shared_ptr<const ParticleSet> ParticleFiles::ReadFile(const std::string& sha256) {
+absl::StatusOr<std::shared_ptr<const ParticleSet>> ParticleFiles::ReadFile(
+    const std::string& sha256) {
   const FileDescriptor file(openat(directory_.get(), FileName(sha256).c_str(),
                                    O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK));
   absl::Status status;
@@ -319,7 +321,8 @@ std::shared_ptr<const ParticleSet> ParticleFiles::ReadFile(const std::string& sh
       // That says nothing of the file, which may well be read the next time.
       Log(LogLevel::kWarn, "cache_dir_not_read",
           {{"set", ToHex(sha256)}, {"message", MessageOf(status)}});
-      return nullptr;
+      return WithRetryHint(WithReason(WithCode(absl::StatusCode::kUnavailable, status),
+                                      v1::ERROR_REASON_CACHE_NOT_READ));
     }
   } else {
     auto set = ReadParticleFile(file.get(), sha256, limits_);

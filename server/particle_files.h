@@ -28,7 +28,7 @@ namespace halflight {
 // looked for when the set is read.
 class ParticleFiles {
  public:
-  using Done = std::function<void(const std::shared_ptr<const ParticleSet>& set)>;
+  using Done = std::function<void(const absl::StatusOr<std::shared_ptr<const ParticleSet>>& set)>;
 
   // Sets of which files are kept, whatever their size.
   static constexpr size_t kMaxFiles = 65536;
@@ -58,8 +58,9 @@ class ParticleFiles {
   void Write(const std::string& sha256, std::shared_ptr<const ParticleSet> set);
 
   // Reads the set and calls `done`, on the thread that reads, with null where it is not here,
-  // `stop` was requested before, or its file is damaged, which then is removed. Who calls bounds
-  // how many wait.
+  // `stop` was requested before, or its file is damaged, which then is removed. Unavailable, with
+  // reason and retry hint, where it cannot be opened for want of descriptors or memory. Who calls
+  // bounds how many wait.
   void Read(const std::string& sha256, std::stop_token stop, Done done);
 
   // Whether nothing waits to be written.
@@ -86,7 +87,7 @@ class ParticleFiles {
   void WriteNow(const std::string& sha256, const std::shared_ptr<const ParticleSet>& set);
   absl::Status WriteFile(const std::string& sha256, const ParticleSet& set);
   void ReadNow(const std::string& sha256);
-  std::shared_ptr<const ParticleSet> ReadFile(const std::string& sha256);
+  absl::StatusOr<std::shared_ptr<const ParticleSet>> ReadFile(const std::string& sha256);
   void SetTime(const std::string& sha256);
   // The same until there is room for this much more within the bounds.
   void MakeRoom(uint64_t bytes);

@@ -67,8 +67,9 @@ bool ParticleStore::OnDiskOnly(const std::string& sha256) {
 void ParticleStore::Fetch(const std::string& sha256, std::stop_token stop,
                           std::function<void(const absl::Status&)> then) {
   files_->Read(sha256, std::move(stop), [this, sha256, then = std::move(then)](const auto& set) {
-    ++(set != nullptr ? disk_reads_ : failed_disk_reads_);
-    then(set != nullptr ? Keep(sha256, set) : absl::OkStatus());
+    const bool read = set.ok() && *set != nullptr;
+    ++(read ? disk_reads_ : failed_disk_reads_);
+    then(read ? Keep(sha256, *set) : set.status());
   });
 }
 

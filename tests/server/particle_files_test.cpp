@@ -17,6 +17,7 @@
 #include <gtest/gtest.h>
 
 #include "halflight/sha256.h"
+#include "server/error_detail.h"
 #include "server/particle_store.h"
 #include "server/particle_upload.h"
 #include "server/status_text.h"
@@ -65,11 +66,17 @@ class Files : public ::testing::Test {
     ASSERT_TRUE(WaitFor([&] { return files.idle(); }));
   }
 
-  static std::shared_ptr<const ParticleSet> Read(ParticleFiles& files, const std::string& sha256,
-                                                 const std::stop_token& stop = {}) {
-    std::promise<std::shared_ptr<const ParticleSet>> read;
+  static absl::StatusOr<std::shared_ptr<const ParticleSet>> TryRead(
+      ParticleFiles& files, const std::string& sha256, const std::stop_token& stop = {}) {
+    std::promise<absl::StatusOr<std::shared_ptr<const ParticleSet>>> read;
     files.Read(sha256, stop, [&read](const auto& set) { read.set_value(set); });
     return read.get_future().get();
+  }
+  static std::shared_ptr<const ParticleSet> Read(ParticleFiles& files, const std::string& sha256,
+                                                 const std::stop_token& stop = {}) {
+    const auto set = TryRead(files, sha256, stop);
+    EXPECT_TRUE(set.ok()) << set.status();
+    return set.value_or(nullptr);
   }
 
   static void ExpectSame(const std::shared_ptr<const ParticleSet>& set,
@@ -329,8 +336,11 @@ TEST_F(Files, WantOfDescriptorsCostsNoSet) {
   ASSERT_EQ(getrlimit(RLIMIT_NOFILE, &limit), 0);
   const rlimit none{.rlim_cur = 3, .rlim_max = limit.rlim_max};
   ASSERT_EQ(setrlimit(RLIMIT_NOFILE, &none), 0);
-  EXPECT_EQ(Read(*files, particles.sha256), nullptr);
+  const auto refused = TryRead(*files, particles.sha256);
   ASSERT_EQ(setrlimit(RLIMIT_NOFILE, &limit), 0);
+  EXPECT_EQ(refused.status().code(), absl::StatusCode::kUnavailable);
+  EXPECT_EQ(DetailOf(refused.status()).reason, v1::ERROR_REASON_CACHE_NOT_READ);
+  EXPECT_TRUE(DetailOf(refused.status()).retry_after.has_value());
   ExpectSame(Read(*files, particles.sha256), particles);
 }
 
