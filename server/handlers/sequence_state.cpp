@@ -2,25 +2,42 @@
 
 #include <utility>
 
+#include <fmt/format.h>
+
+#include "server/error_detail.h"
+
 namespace halflight {
 
-absl::StatusOr<FrameJob> SequenceState::Next(const v1::RenderFrameRequest& request,
-                                             const Backend& backend) {
+absl::Status SequenceState::Hold(NamedParticles brought) {
+  inline_memory_.Release();
+  const uint64_t bytes = MemoryBytes(*brought.set);
+  const auto growth = backend_.partial_uploads.Grow(inline_memory_, bytes);
+  if (growth != ByteBudget::Growth::kDone) {
+    return BusyError(v1::ERROR_REASON_UPLOAD_MEMORY_FULL,
+                     fmt::format("scene.inline_particles of {} bytes", bytes),
+                     backend_.partial_uploads.memory().Allowed(growth, "uploads in progress"));
+  }
+  inline_ = std::move(brought);
+  return absl::OkStatus();
+}
+
+absl::StatusOr<FrameJob> SequenceState::Next(const v1::RenderFrameRequest& request) {
   const v1::Scene& scene = request.scene();
   v1::Scene& merged = *merged_.mutable_scene();
   if (scene.has_inline_particles()) {
-    auto brought = ResolveParticles(scene, backend.store, backend.limits);
-    if (!brought.ok()) {
-      return brought.status();
+    auto brought = ResolveParticles(scene, backend_.store, backend_.limits);
+    const absl::Status held = brought.ok() ? Hold(*std::move(brought)) : brought.status();
+    if (!held.ok()) {
+      return held;
     }
-    inline_ = *std::move(brought);
     merged.clear_particles();
   } else if (scene.has_particle_sha256()) {
     merged.set_particle_sha256(scene.particle_sha256());
     inline_.reset();
+    inline_memory_.Release();
   }
   const auto particles =
-      inline_.has_value() ? *inline_ : ResolveParticles(merged, backend.store, backend.limits);
+      inline_.has_value() ? *inline_ : ResolveParticles(merged, backend_.store, backend_.limits);
   if (!particles.ok()) {
     return particles.status();
   }
@@ -61,7 +78,7 @@ absl::StatusOr<FrameJob> SequenceState::Next(const v1::RenderFrameRequest& reque
   }
   merged_.set_request_id(request.request_id());
   merged_.set_priority(request.priority());
-  auto job = ConvertFrame(merged_, *particles, backend.limits, backend.device);
+  auto job = ConvertFrame(merged_, *particles, backend_.limits, backend_.device);
   if (job.ok() && job->target.has_value()) {
     job->target->knowledge = knowledge_;
   }

@@ -17,21 +17,21 @@ constexpr int kMaxFrames = 16;
 void Check(Input input) {
   static auto* const engine = new testing::FakeEngine;
   static auto* const pipeline = new FramePipeline(*engine, {});
-  static auto* const memory = new ByteBudget(0);
+  static auto* const memory = new ByteBudget(kGiB);
   static auto* const partial = new PartialUploads(*memory, {});
   static const auto* const version = new std::string("fuzz");
 
   const Server& server = ServerOf(input.Byte());
   const Backend backend{server.device,   server.limits, *version,
                         StoreWithSets(), *partial,      *pipeline};
-  SequenceState state;
+  SequenceState state(backend);
   for (int i = 0; i < kMaxFrames && !input.empty(); ++i) {
     const std::string_view bytes = input.Bytes(input.Short());
     v1::RenderSequenceRequest request;
     if (!request.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()))) {
       return;
     }
-    const auto job = state.Next(request.frame(), backend);
+    const auto job = state.Next(request.frame());
     if (i == 0) {
       const auto alone =
           ConvertRequest(request.frame(), backend.store, server.limits, server.device);
