@@ -82,8 +82,9 @@ void ServeChannelz(const std::vector<ListeningSocket>& sockets) {
 }  // namespace
 
 struct GrpcServer::Parts {
-  Parts(const Backend& backend, const Access& access) : service(backend, access) {}
+  Parts(const Backend& backend, const Access& access) : service(backend, access, connections) {}
 
+  Connections connections;
   RenderService service;
   std::unique_ptr<grpc::Server> server;
   std::unique_ptr<grpc::experimental::ExternalConnectionAcceptor> to_server;
@@ -135,7 +136,7 @@ absl::StatusOr<std::unique_ptr<GrpcServer>> GrpcServer::Start(std::vector<Listen
     }
   }
   auto acceptor = Acceptor::Start(
-      std::move(sockets), backend.limits.max_connections,
+      std::move(sockets), started->parts_->connections, backend.limits.max_connections,
       [to_server = started->parts_->to_server.get()](int fd) {
         grpc::experimental::ExternalConnectionAcceptor::NewConnectionParameters connection;
         connection.fd = fd;

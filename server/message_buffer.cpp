@@ -7,8 +7,11 @@
 #include <memory>
 #include <utility>
 
+#include <fmt/format.h>
 #include <google/protobuf/io/coded_stream.h>
 #include <google/protobuf/io/zero_copy_stream_impl_lite.h>
+
+#include "renderer/field_error.h"
 
 namespace halflight {
 namespace {
@@ -22,6 +25,16 @@ constexpr uint32_t Tag(int field) {
 }
 
 }  // namespace
+
+absl::Status UnreadableMessage(const google::protobuf::Message& wanted) {
+  return FieldError("message", "bytes that are none",
+                    fmt::format("a {}", wanted.GetDescriptor()->name()));
+}
+
+absl::Status ExcessiveMessage(size_t read_bytes) {
+  return FieldError("message", fmt::format("one that takes {} bytes once it is read", read_bytes),
+                    fmt::format("at most {} beside particles", kMaxReadBytes));
+}
 
 std::string BytesBeforeData(std::string rest, int chunk_field, const v1::OutputChunk& chunk,
                             size_t data_bytes) {

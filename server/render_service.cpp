@@ -3,30 +3,36 @@
 #include <memory>
 #include <utility>
 
-#include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "halflight/v1/service.grpc.pb.h"
 #include "server/handlers/find_missing_particles.h"
 #include "server/handlers/get_server_info.h"
 #include "server/handlers/query_upload.h"
 #include "server/stream_calls.h"
+#include "server/unary_call.h"
 
 namespace halflight {
 namespace {
 
+using grpc::ByteBuffer;
 using grpc::CallbackServerContext;
 
 using Rpcs = v1::RenderService;
-using CallbackService = Rpcs::WithCallbackMethod_GetServerInfo<
-    Rpcs::WithCallbackMethod_FindMissingParticles<Rpcs::WithCallbackMethod_QueryUpload<
+// All but uploads in bytes: what is read of them is bounded, and what is sent need not be copied.
+using CallbackService = Rpcs::WithRawCallbackMethod_GetServerInfo<
+    Rpcs::WithRawCallbackMethod_FindMissingParticles<Rpcs::WithRawCallbackMethod_QueryUpload<
         Rpcs::WithCallbackMethod_UploadParticles<Rpcs::WithRawCallbackMethod_RenderFrame<
             Rpcs::WithRawCallbackMethod_RenderSequence<Rpcs::Service>>>>>>;
+
+// gRPC made it for the call, and looks at it no more.
+ByteBuffer& Own(const ByteBuffer* request) { return *const_cast<ByteBuffer*>(request); }
 
 }  // namespace
 
 class RenderService::Calls final : public CallbackService {
  public:
-  Calls(const Backend& backend, const Access& access) : shared_(backend, access) {}
+  Calls(const Backend& backend, const Access& access, Connections& connections)
+      : shared_(backend, access, connections) {}
 
   CallCount& count() { return shared_.count; }
 
@@ -35,31 +41,33 @@ class RenderService::Calls final : public CallbackService {
     shared_.sequences.Drain();
   }
 
-  grpc::ServerUnaryReactor* GetServerInfo(CallbackServerContext* context,
-                                          const v1::GetServerInfoRequest* request,
-                                          v1::GetServerInfoResponse* response) override {
-    return AnswerAtOnce(Rpc::kGetServerInfo, *context, *request, *response,
-                        [&](const Caller& /*caller*/) -> absl::StatusOr<v1::GetServerInfoResponse> {
-                          return halflight::GetServerInfo(shared_.backend);
-                        });
+  grpc::ServerUnaryReactor* GetServerInfo(CallbackServerContext* context, const ByteBuffer* request,
+                                          ByteBuffer* response) override {
+    return Answer<v1::GetServerInfoRequest>(
+        Rpc::kGetServerInfo, *context, request, *response,
+        [this](const auto& /*message*/,
+               const Caller& /*caller*/) -> absl::StatusOr<v1::GetServerInfoResponse> {
+          return halflight::GetServerInfo(shared_.backend);
+        });
   }
 
-  grpc::ServerUnaryReactor* FindMissingParticles(
-      CallbackServerContext* context, const v1::FindMissingParticlesRequest* request,
-      v1::FindMissingParticlesResponse* response) override {
-    return AnswerAtOnce(Rpc::kFindMissingParticles, *context, *request, *response,
-                        [&](const Caller& /*caller*/) {
-                          return halflight::FindMissingParticles(shared_.backend, *request);
-                        });
+  grpc::ServerUnaryReactor* FindMissingParticles(CallbackServerContext* context,
+                                                 const ByteBuffer* request,
+                                                 ByteBuffer* response) override {
+    return Answer<v1::FindMissingParticlesRequest>(
+        Rpc::kFindMissingParticles, *context, request, *response,
+        [this](const auto& message, const Caller& /*caller*/) {
+          return halflight::FindMissingParticles(shared_.backend, message);
+        });
   }
 
-  grpc::ServerUnaryReactor* QueryUpload(CallbackServerContext* context,
-                                        const v1::QueryUploadRequest* request,
-                                        v1::QueryUploadResponse* response) override {
-    return AnswerAtOnce(Rpc::kQueryUpload, *context, *request, *response,
-                        [&](const Caller& caller) {
-                          return halflight::QueryUpload(shared_.backend, *request, caller);
-                        });
+  grpc::ServerUnaryReactor* QueryUpload(CallbackServerContext* context, const ByteBuffer* request,
+                                        ByteBuffer* response) override {
+    return Answer<v1::QueryUploadRequest>(Rpc::kQueryUpload, *context, request, *response,
+                                          [this](const auto& message, const Caller& caller) {
+                                            return halflight::QueryUpload(shared_.backend, message,
+                                                                          caller);
+                                          });
   }
 
   grpc::ServerReadReactor<v1::UploadParticlesRequest>* UploadParticles(
@@ -67,47 +75,31 @@ class RenderService::Calls final : public CallbackService {
     return NewUploadCall(shared_, *context, *response);
   }
 
-  grpc::ServerWriteReactor<grpc::ByteBuffer>* RenderFrame(
-      CallbackServerContext* context, const grpc::ByteBuffer* request) override {
-    return NewRenderFrameCall(shared_, *context, *request);
+  grpc::ServerWriteReactor<ByteBuffer>* RenderFrame(CallbackServerContext* context,
+                                                    const ByteBuffer* request) override {
+    return NewRenderFrameCall(shared_, *context, Own(request));
   }
 
-  grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer>* RenderSequence(
+  grpc::ServerBidiReactor<ByteBuffer, ByteBuffer>* RenderSequence(
       CallbackServerContext* context) override {
     return NewRenderSequenceCall(shared_, *context);
   }
 
  private:
-  template <typename Request, typename Response, typename Handler>
-  grpc::ServerUnaryReactor* AnswerAtOnce(Rpc rpc, CallbackServerContext& context,
-                                         const Request& request, Response& response,
-                                         const Handler& handler) {
-    grpc::Status status;
-    {
-      // Gone before the call is finished, which may take the context along.
-      CallToken token(rpc, shared_.count, shared_.backend, shared_.access, context);
-      token.OnReceived(request.ByteSizeLong());
-      absl::Status outcome = token.refusal();
-      if (outcome.ok()) {
-        auto answer = handler(token.caller());
-        outcome = answer.status();
-        if (answer.ok()) {
-          response = *std::move(answer);
-          token.OnSent(response.ByteSizeLong());
-        }
-      }
-      status = token.End(outcome);
-    }
-    grpc::ServerUnaryReactor* const reactor = context.DefaultReactor();
-    reactor->Finish(status);
-    return reactor;
+  template <typename Request, typename Handler>
+  grpc::ServerUnaryReactor* Answer(Rpc rpc, CallbackServerContext& context,
+                                   const ByteBuffer* request, ByteBuffer& response,
+                                   const Handler& handler) {
+    auto* const call = new UnaryCall(rpc, shared_, context);
+    call->Answer<Request>(Own(request), response, handler);
+    return call;
   }
 
   SharedByCalls shared_;
 };
 
-RenderService::RenderService(const Backend& backend, const Access& access)
-    : calls_(std::make_unique<Calls>(backend, access)) {}
+RenderService::RenderService(const Backend& backend, const Access& access, Connections& connections)
+    : calls_(std::make_unique<Calls>(backend, access, connections)) {}
 
 RenderService::~RenderService() = default;
 

@@ -7,6 +7,7 @@
 
 #include "server/access/access.h"
 #include "server/handlers/backend.h"
+#include "server/listen/connections.h"
 
 namespace grpc {
 class Service;
@@ -16,8 +17,9 @@ namespace halflight {
 
 class RenderService {
  public:
-  // Both outlive the service. Calls of whom `access` does not know end with UNAUTHENTICATED.
-  RenderService(const Backend& backend, const Access& access);
+  // All outlive the service. Calls of whom `access` does not know end with UNAUTHENTICATED.
+  // `connections`: those that calls come by, ended where calls stall and cannot be ended otherwise.
+  RenderService(const Backend& backend, const Access& access, Connections& connections);
   // After the gRPC server that it was registered with.
   ~RenderService();
   RenderService(const RenderService&) = delete;

@@ -1,12 +1,9 @@
 #include "server/stream_calls.h"
 
-#include <chrono>
-#include <functional>
 #include <memory>
-#include <optional>
 #include <string>
+#include <utility>
 
-#include "renderer/field_error.h"
 #include "server/handlers/render_frame.h"
 #include "server/handlers/render_sequence.h"
 #include "server/handlers/upload_particles.h"
@@ -23,15 +20,6 @@ namespace {
 
 using grpc::CallbackServerContext;
 
-std::chrono::seconds StallLimit(const Backend& backend) {
-  return std::chrono::seconds(backend.limits.max_stall_seconds);
-}
-
-// What becomes of a call whose peer stalls.
-std::function<void()> EndForStall(CallToken& token, const Backend& backend) {
-  return [&token, limit = StallLimit(backend)] { token.EndForStall(limit); };
-}
-
 class UploadCall final : public grpc::ServerReadReactor<v1::UploadParticlesRequest> {
  public:
   UploadCall(SharedByCalls& shared, CallbackServerContext& context,
@@ -39,7 +27,7 @@ class UploadCall final : public grpc::ServerReadReactor<v1::UploadParticlesReque
       : token_(Rpc::kUploadParticles, shared.count, shared.backend, shared.access, context),
         response_(response),
         handler_(shared.backend, token_.caller()),
-        stall_(shared.timer, StallLimit(shared.backend), EndForStall(token_, shared.backend)) {
+        stall_(shared.timer, shared.stall_limit(), shared.EndForStall(token_)) {
     if (!token_.refusal().ok()) {
       Answer(token_.refusal());
     } else {
@@ -85,16 +73,6 @@ class UploadCall final : public grpc::ServerReadReactor<v1::UploadParticlesReque
   v1::UploadParticlesRequest request_;
 };
 
-// What sends frames takes messages in bytes, so that chunks need not be copied into messages first.
-template <typename Message>
-std::optional<Message> Parse(grpc::ByteBuffer bytes) {
-  Message message;
-  if (!grpc::SerializationTraits<Message>::Deserialize(&bytes, &message).ok()) {
-    return std::nullopt;
-  }
-  return message;
-}
-
 // A call that sends frames: what both kinds have in common.
 template <typename Reactor, template <typename> typename Sink, typename Response, typename Handler>
 class SendingCall : public Reactor, public Sink<Response> {
@@ -116,7 +94,7 @@ class SendingCall : public Reactor, public Sink<Response> {
   SendingCall(Rpc rpc, SharedByCalls& shared, CallbackServerContext& context,
               const std::string& request_id)
       : token_(rpc, shared.count, shared.backend, shared.access, context, request_id),
-        stall_(shared.timer, StallLimit(shared.backend), EndForStall(token_, shared.backend)),
+        stall_(shared.timer, shared.stall_limit(), shared.EndForStall(token_)),
         handler_(std::make_shared<Handler>(shared.backend, *this, token_.caller())) {}
 
   void Write(const OutgoingMessage<Response>& outgoing) override {
@@ -142,16 +120,14 @@ class RenderFrameCall final
     : public SendingCall<grpc::ServerWriteReactor<grpc::ByteBuffer>, ResponseSink,
                          v1::RenderFrameResponse, RenderFrameHandler> {
  public:
-  // `request`: none where the bytes of the message are not one.
   RenderFrameCall(SharedByCalls& shared, CallbackServerContext& context, size_t request_bytes,
-                  const std::optional<v1::RenderFrameRequest>& request)
-      : SendingCall(Rpc::kRenderFrame, shared, context,
-                    request.has_value() ? request->request_id() : "") {
+                  const absl::StatusOr<v1::RenderFrameRequest>& request)
+      : SendingCall(Rpc::kRenderFrame, shared, context, request.ok() ? request->request_id() : "") {
     token_.OnReceived(request_bytes);
     if (!token_.refusal().ok()) {
       RenderFrameCall::Finish(token_.refusal());
-    } else if (!request.has_value()) {
-      RenderFrameCall::Finish(FieldError("message", "bytes that are none", "a RenderFrameRequest"));
+    } else if (!request.ok()) {
+      RenderFrameCall::Finish(request.status());
     } else {
       handler_->Start(*request);
     }
@@ -178,12 +154,12 @@ class RenderSequenceCall final
       return;
     }
     token_.OnReceived(request_.Length());
-    if (auto message = Parse<v1::RenderSequenceRequest>(request_)) {
+    if (auto message = TakeMessage<v1::RenderSequenceRequest>(request_); message.ok()) {
       // It keeps what it is sent, which is bounded by what is known.
       message->DiscardUnknownFields();
       handler_->OnRequest(*message);
     } else {
-      handler_->OnUnreadableRequest();
+      handler_->OnUnreadableRequest(message.status());
     }
   }
 
@@ -202,9 +178,9 @@ grpc::ServerReadReactor<v1::UploadParticlesRequest>* NewUploadCall(
 
 grpc::ServerWriteReactor<grpc::ByteBuffer>* NewRenderFrameCall(SharedByCalls& shared,
                                                                CallbackServerContext& context,
-                                                               const grpc::ByteBuffer& request) {
-  return new RenderFrameCall(shared, context, request.Length(),
-                             Parse<v1::RenderFrameRequest>(request));
+                                                               grpc::ByteBuffer& request) {
+  const size_t bytes = request.Length();
+  return new RenderFrameCall(shared, context, bytes, TakeMessage<v1::RenderFrameRequest>(request));
 }
 
 grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer>* NewRenderSequenceCall(

@@ -30,13 +30,10 @@ void RenderSequenceHandler::Accept(const v1::RenderSequenceRequest& request,
   if (stop_.stop_requested()) {
     return;  // whoever did has ended the call
   }
-  Take(fetched.ok() ? state_.Next(request.frame(), backend_) : fetched,
-       request.frame().request_id());
+  Take(fetched.ok() ? state_.Next(request.frame()) : fetched, request.frame().request_id());
 }
 
-void RenderSequenceHandler::OnUnreadableRequest() {
-  Take(FieldError("message", "bytes that are none", "a RenderSequenceRequest"), "");
-}
+void RenderSequenceHandler::OnUnreadableRequest(const absl::Status& why) { Take(why, ""); }
 
 void RenderSequenceHandler::Take(absl::StatusOr<FrameJob> job, const std::string& request_id) {
   {

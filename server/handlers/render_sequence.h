@@ -38,13 +38,17 @@ class RenderSequenceHandler : public std::enable_shared_from_this<RenderSequence
  public:
   RenderSequenceHandler(const Backend& backend, DuplexSink<v1::RenderSequenceResponse>& sink,
                         Caller caller = {})
-      : backend_(backend), sink_(sink), caller_(std::move(caller)) {}
+      : backend_(backend),
+        sink_(sink),
+        caller_(std::move(caller)),
+        state_(backend_, caller_.client()) {}
 
   // Once, first.
   void Start() { Advance(); }
   void OnRequest(const v1::RenderSequenceRequest& request);
-  // One that is no RenderSequenceRequest: refused as a frame that asks for nonsense is.
-  void OnUnreadableRequest();
+  // Instead, where what came cannot be taken for this reason: refused as a frame that asks for
+  // nonsense is.
+  void OnUnreadableRequest(const absl::Status& why);
   void OnEndOfRequests();
   // The server shuts down: what was accepted goes on, and the stream ends where it stands. Any
   // thread, any time.

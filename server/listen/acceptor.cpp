@@ -6,7 +6,6 @@
 #include <cerrno>
 #include <chrono>
 #include <cstring>
-#include <mutex>
 #include <optional>
 #include <utility>
 
@@ -19,7 +18,6 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-#include "server/listen/connections.h"
 #include "server/log/log.h"
 
 namespace halflight {
@@ -97,8 +95,10 @@ class Complaint {
 
 class Acceptor::Loop {
  public:
-  Loop(std::vector<ListeningSocket> sockets, uint32_t max_connections, Serve serve)
+  Loop(std::vector<ListeningSocket> sockets, Connections& connections, uint32_t max_connections,
+       Serve serve)
       : sockets_(std::move(sockets)),
+        connections_(connections),
         max_connections_(max_connections),
         serve_(std::move(serve)),
         wake_(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {}
@@ -145,14 +145,13 @@ class Acceptor::Loop {
   // After Run has returned.
   void Close() { sockets_.clear(); }
 
-  void HangUp() {
-    const std::lock_guard lock(mutex_);
-    connections_.HangUp();
-  }
+  void HangUp() { connections_.HangUp(); }
+  void CutOff() { connections_.CutOff(); }
 
   ConnectionCounts Counts() {
-    const std::lock_guard lock(mutex_);
-    return {.open = connections_.Count(), .accepted = accepted_, .refused = complaint_.refused()};
+    return {.open = connections_.Count(),
+            .accepted = connections_.added(),
+            .refused = complaint_.refused()};
   }
 
  private:
@@ -194,16 +193,8 @@ class Acceptor::Loop {
   }
 
   void Take(int fd) {
-    {
-      const std::lock_guard lock(mutex_);
-      if (!connections_.AtLeast(max_connections_)) {
-        connections_.Add(fd);
-        ++accepted_;
-      } else {
-        close(std::exchange(fd, -1));
-      }
-    }
-    if (fd < 0) {
+    if (!connections_.Add(fd, max_connections_)) {
+      close(fd);
       complaint_.Count("max_connections are open");
       return;
     }
@@ -227,19 +218,19 @@ class Acceptor::Loop {
   }
 
   std::vector<ListeningSocket> sockets_;
+  Connections& connections_;
   const uint32_t max_connections_;
   const Serve serve_;
   const int wake_;
-  std::mutex mutex_;  // of what others look at
-  Connections connections_;
-  uint64_t accepted_ = 0;
   Reserve reserve_;
   Complaint complaint_;
 };
 
 absl::StatusOr<std::unique_ptr<Acceptor>> Acceptor::Start(std::vector<ListeningSocket> sockets,
+                                                          Connections& connections,
                                                           uint32_t max_connections, Serve serve) {
-  auto loop = std::make_unique<Loop>(std::move(sockets), max_connections, std::move(serve));
+  auto loop =
+      std::make_unique<Loop>(std::move(sockets), connections, max_connections, std::move(serve));
   if (absl::Status status = loop->Listen(); !status.ok()) {
     return status;
   }
@@ -268,6 +259,7 @@ void Acceptor::HangUp(std::chrono::milliseconds at_most) {
   while (loop_->Counts().open > 0 && std::chrono::steady_clock::now() < until) {
     std::this_thread::sleep_for(kLookAgain);
   }
+  loop_->CutOff();
 }
 
 uint32_t RoomForConnections() {

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
+#include "server/listen/connections.h"
 #include "server/listen/listening_socket.h"
 
 namespace halflight {
@@ -30,8 +31,9 @@ class Acceptor {
   // Listens on all sockets. With `max_connections` open, or without a descriptor left, a client
   // that connects is disconnected at once, which gRPC reports as UNAVAILABLE: it can try elsewhere
   // or later. Left waiting it would seem to be connected, and hang until its deadline. Unavailable
-  // where a socket cannot listen.
+  // where a socket cannot listen. `connections` outlive the acceptor.
   static absl::StatusOr<std::unique_ptr<Acceptor>> Start(std::vector<ListeningSocket> sockets,
+                                                         Connections& connections,
                                                          uint32_t max_connections, Serve serve);
   // Stops.
   ~Acceptor();
@@ -46,7 +48,8 @@ class Acceptor {
   [[nodiscard]] ConnectionCounts counts() const;
 
   // Stops, receives nothing more from those connected, and waits until whoever serves them has
-  // closed their connections, at most that long: a peer finds its connection lost.
+  // closed their connections, at most that long: a peer finds its connection lost. Those that are
+  // left then are cut off.
   void HangUp(std::chrono::milliseconds at_most);
 
  private:

@@ -1,5 +1,9 @@
 #include "server/listen/connections.h"
 
+#include <linux/sockios.h>
+#include <linux/tcp.h>
+#include <netinet/in.h>
+#include <sys/ioctl.h>
 #include <sys/socket.h>
 
 namespace halflight {
@@ -16,29 +20,72 @@ uint64_t CookieOf(int fd) {
 
 }  // namespace
 
-void Connections::Add(int fd) { cookies_[fd] = CookieOf(fd); }
-
-bool Connections::AtLeast(size_t limit) {
-  if (cookies_.size() < limit) {
+bool Connections::Add(int fd, size_t limit) {
+  const std::lock_guard lock(mutex_);
+  if (open_.size() >= limit && Clock::now() - looked_ >= kLookAgain) {
+    ForgetClosed();
+  }
+  if (open_.size() >= limit) {
     return false;
   }
-  if (std::chrono::steady_clock::now() - looked_ < kLookAgain) {
-    return true;
-  }
-  return Count() >= limit;
+  open_[fd] = {.cookie = CookieOf(fd)};
+  ++added_;
+  return true;
 }
 
 size_t Connections::Count() {
-  std::erase_if(cookies_, [](const auto& entry) { return CookieOf(entry.first) != entry.second; });
-  looked_ = std::chrono::steady_clock::now();
-  return cookies_.size();
+  const std::lock_guard lock(mutex_);
+  ForgetClosed();
+  return open_.size();
 }
 
-void Connections::HangUp() {
-  Count();
-  for (const auto& [fd, cookie] : cookies_) {
-    shutdown(fd, SHUT_RD);
+uint64_t Connections::added() const {
+  const std::lock_guard lock(mutex_);
+  return added_;
+}
+
+void Connections::ForgetClosed() {
+  std::erase_if(open_,
+                [](const auto& entry) { return CookieOf(entry.first) != entry.second.cookie; });
+  looked_ = Clock::now();
+}
+
+void Connections::HangUp() { ShutDown(SHUT_RD); }
+
+void Connections::CutOff() { ShutDown(SHUT_RDWR); }
+
+void Connections::ShutDown(int how) {
+  const std::lock_guard lock(mutex_);
+  ForgetClosed();
+  for (const auto& [fd, connection] : open_) {
+    shutdown(fd, how);
   }
+}
+
+void Connections::HangUpOnStalled(std::chrono::milliseconds at_least) {
+  const std::lock_guard lock(mutex_);
+  ForgetClosed();
+  for (auto& [fd, connection] : open_) {
+    const Backlog backlog = BacklogOf(fd);
+    if (backlog.unread == 0 || backlog != connection.backlog) {
+      connection.backlog = backlog;
+      connection.since = looked_;
+    } else if (looked_ - connection.since >= at_least) {
+      shutdown(fd, SHUT_RDWR);
+    }
+  }
+}
+
+// Of a unix socket the kernel counts what is unread alone.
+Connections::Backlog Connections::BacklogOf(int fd) {
+  Backlog backlog;
+  ioctl(fd, SIOCOUTQ, &backlog.unread);
+  tcp_info info{};
+  socklen_t length = sizeof(info);
+  if (getsockopt(fd, IPPROTO_TCP, TCP_INFO, &info, &length) == 0) {
+    backlog.taken = info.tcpi_bytes_acked;
+  }
+  return backlog;
 }
 
 }  // namespace halflight

@@ -1,9 +1,11 @@
-// The connections that are open, counted without a word from whoever owns them. Closes nothing.
+// The connections that are open, counted without a word from whoever owns them, and ended where a
+// peer takes nothing any more. Speaks no protocol.
 #pragma once
 
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <mutex>
 #include <unordered_map>
 
 namespace halflight {
@@ -12,27 +14,57 @@ namespace halflight {
 // number of its own (SO_COOKIE), never to be used again: a descriptor under which that number is
 // not found any more has been closed, whoever has the descriptor now. Looking costs 0.3 us a
 // connection and no descriptor; what it cannot tell is when a connection ended, only that it did by
-// the time somebody looks. One thread.
+// the time somebody looks. Any thread.
 class Connections {
  public:
-  // A socket that is handed on.
-  void Add(int fd);
+  // A socket that is handed on; false, and nothing is kept of it, where `limit` are open. Looks at
+  // the sockets only when as many were added and not seen to be closed, and then every few
+  // milliseconds at most, so that a crowd at the door costs no more than its accepting.
+  bool Add(int fd, size_t limit);
 
-  // Whether `limit` connections or more are open. Looks at the sockets only when as many were added
-  // and not seen to be closed, and then every few milliseconds at most, so that a crowd at the door
-  // costs no more than its accepting.
-  bool AtLeast(size_t limit);
-
-  // Looks at each.
+  // Open ones: looks at each.
   size_t Count();
+  // All that were ever added.
+  [[nodiscard]] uint64_t added() const;
 
   // Nothing more is received over those that are open: who serves them finds that their peers are
   // gone, and closes them.
   void HangUp();
+  // Nothing is sent either, not even what waits for peers that take nothing.
+  void CutOff();
+
+  // Ends those whose peers have left unread what was sent to them and have taken nothing of it from
+  // one call of this to another that came `at_least` later.
+  //
+  // gRPC 1.51 cancels no call while it writes to the call's socket, and so not at all where that is
+  // full and the peer's kernel alone answers for it: a process that was stopped, or one that reads
+  // nothing. Only when the socket ends do the calls. (Can go when gRPC fails what waits behind a
+  // write without waiting for the write.)
+  void HangUpOnStalled(std::chrono::milliseconds at_least);
 
  private:
-  std::unordered_map<int, uint64_t> cookies_;  // by descriptor
-  std::chrono::steady_clock::time_point looked_;
+  using Clock = std::chrono::steady_clock;
+  // What is left unread, bytes, and how much was ever taken, where the kernel counts that.
+  struct Backlog {
+    int unread = 0;
+    uint64_t taken = 0;
+    bool operator==(const Backlog&) const = default;
+  };
+  struct Connection {
+    uint64_t cookie = 0;
+    Backlog backlog{};
+    Clock::time_point since{};  // when it was first seen to be so
+  };
+
+  static Backlog BacklogOf(int fd);
+  void ShutDown(int how);
+  // Under the mutex.
+  void ForgetClosed();
+
+  mutable std::mutex mutex_;
+  std::unordered_map<int, Connection> open_;  // by descriptor
+  uint64_t added_ = 0;
+  Clock::time_point looked_;
 };
 
 }  // namespace halflight

@@ -100,10 +100,12 @@ class Server final : public MetricsServer {
   Server& operator=(const Server&) = delete;
 
   absl::Status Listen(std::vector<ListeningSocket> sockets) {
-    auto acceptor = Acceptor::Start(std::move(sockets), kMaxConnections, [this](int fd) {
-      // Tasks can be copied, descriptors that close themselves cannot.
-      workers_.Post([this, kept = std::make_shared<FileDescriptor>(fd)] { Serve(kept->get()); });
-    });
+    auto acceptor =
+        Acceptor::Start(std::move(sockets), connections_, kMaxConnections, [this](int fd) {
+          // Tasks can be copied, descriptors that close themselves cannot.
+          workers_.Post(
+              [this, kept = std::make_shared<FileDescriptor>(fd)] { Serve(kept->get()); });
+        });
     if (!acceptor.ok()) {
       return acceptor.status();
     }
@@ -133,6 +135,7 @@ class Server final : public MetricsServer {
   std::mutex mutex_;
   bool closing_ = false;
   std::set<int> open_;
+  Connections connections_;
   WorkerPool workers_{kThreads};
   std::unique_ptr<Acceptor> acceptor_;
 };

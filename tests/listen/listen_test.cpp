@@ -69,8 +69,8 @@ class AcceptorTest : public ::testing::Test {
     auto sockets = ListeningSocket::Bind("127.0.0.1:0");
     ASSERT_TRUE(sockets.ok()) << sockets.status();
     address_ = sockets->front().address();
-    auto acceptor =
-        Acceptor::Start(*std::move(sockets), max_connections, [this](int fd) { served_.Take(fd); });
+    auto acceptor = Acceptor::Start(*std::move(sockets), connections_, max_connections,
+                                    [this](int fd) { served_.Take(fd); });
     ASSERT_TRUE(acceptor.ok()) << acceptor.status();
     acceptor_ = *std::move(acceptor);
   }
@@ -82,6 +82,7 @@ class AcceptorTest : public ::testing::Test {
 
   Served served_;
   std::string address_;
+  Connections connections_;
   std::unique_ptr<Acceptor> acceptor_;
 };
 
@@ -90,8 +91,8 @@ TEST_F(AcceptorTest, HandsOverSocketsThatDoNotBlockNorStayInChildren) {
   auto sockets = ListeningSocket::Bind("127.0.0.1:0");
   ASSERT_TRUE(sockets.ok());
   const std::string address = sockets->front().address();
-  const auto acceptor =
-      Acceptor::Start(*std::move(sockets), 10, [&accepted](int fd) { accepted = fd; });
+  const auto acceptor = Acceptor::Start(*std::move(sockets), connections_, 10,
+                                        [&accepted](int fd) { accepted = fd; });
   ASSERT_TRUE(acceptor.ok());
   ClientSocket client;
   ASSERT_TRUE(client.Connect(address));
@@ -199,11 +200,10 @@ TEST(Connections, CountWhatIsOpenWhoeverHasTheDescriptorsNow) {
   Connections connections;
   std::vector<ClientSocket> sockets(3);
   for (const ClientSocket& socket : sockets) {
-    connections.Add(socket.fd());
+    EXPECT_TRUE(connections.Add(socket.fd(), 3));
   }
   EXPECT_EQ(connections.Count(), 3U);
-  EXPECT_TRUE(connections.AtLeast(3));
-  EXPECT_FALSE(connections.AtLeast(4));
+  EXPECT_FALSE(connections.Add(STDIN_FILENO, 3));
   // Another socket, and something that is none, under the same numbers.
   const int first = sockets[0].fd();
   const int second = sockets[1].fd();
@@ -213,6 +213,47 @@ TEST(Connections, CountWhatIsOpenWhoeverHasTheDescriptorsNow) {
   EXPECT_EQ(connections.Count(), 1U);
   sockets[2].Close();
   EXPECT_EQ(connections.Count(), 0U);
+}
+
+TEST(Connections, OfThoseThatTakeNothingAreEnded) {
+  using std::chrono::milliseconds;
+  Connections connections;
+  struct Pair {
+    int ours = -1;
+    int theirs = -1;
+  };
+  std::vector<Pair> pairs(3);
+  for (Pair& pair : pairs) {
+    int fds[2];
+    ASSERT_EQ(socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0, fds), 0);
+    pair = {fds[0], fds[1]};
+    ASSERT_TRUE(connections.Add(pair.ours, 10));
+  }
+  const Pair stopped = pairs[0];
+  const Pair slow = pairs[1];
+  const Pair idle = pairs[2];
+  const auto ended = [](const Pair& pair) {
+    return send(pair.ours, "x", 1, MSG_NOSIGNAL) < 0 && errno == EPIPE;
+  };
+  const std::string part(10000, 'x');
+  for (const Pair& pair : {stopped, slow}) {
+    for (int i = 0; i < 3; ++i) {
+      ASSERT_EQ(write(pair.ours, part.data(), part.size()), static_cast<ssize_t>(part.size()));
+    }
+  }
+  connections.HangUpOnStalled(milliseconds(20));
+  connections.HangUpOnStalled(milliseconds(20));
+  std::this_thread::sleep_for(milliseconds(30));
+  std::string taken(part.size(), '\0');
+  ASSERT_EQ(read(slow.theirs, taken.data(), taken.size()), static_cast<ssize_t>(taken.size()));
+  connections.HangUpOnStalled(milliseconds(20));
+  EXPECT_TRUE(ended(stopped));
+  EXPECT_FALSE(ended(slow));
+  EXPECT_FALSE(ended(idle));
+  for (const Pair& pair : pairs) {
+    close(pair.ours);
+    close(pair.theirs);
+  }
 }
 
 TEST(ListeningSocket, TellsWhereItIsAndWhetherOthersCanConnect) {

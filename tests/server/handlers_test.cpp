@@ -422,15 +422,35 @@ TEST_F(Sequence, UnsetPartsAreThoseOfTheRequestBefore) {
 }
 
 TEST_F(Sequence, PriorityIsThatOfTheRequestItself) {
-  SequenceState state;
+  SequenceState state(backend_);
   v1::RenderFrameRequest request = MakeRequest();
   request.set_priority(7);
-  EXPECT_EQ(state.Next(request, backend_)->priority, 7);
+  EXPECT_EQ(state.Next(request)->priority, 7);
   v1::RenderFrameRequest same;
-  EXPECT_EQ(state.Next(same, backend_)->priority, 0);
+  EXPECT_EQ(state.Next(same)->priority, 0);
   same.set_priority(101);
-  EXPECT_THAT(std::string(state.Next(same, backend_).status().message()),
-              HasSubstr("priority: 101"));
+  EXPECT_THAT(std::string(state.Next(same).status().message()), HasSubstr("priority: 101"));
+}
+
+TEST_F(Sequence, ParticlesThatItCarriesCountUntilOthersTakeTheirPlace) {
+  v1::RenderFrameRequest request = MakeRequest();
+  v1::InlineParticles& particles = *request.mutable_scene()->mutable_inline_particles();
+  particles = MakeParticles(50000, {v1::PARTICLE_ATTRIBUTE_POSITION});
+  request.mutable_scene()->mutable_material()->set_radius(0.1F);
+  {
+    SequenceState one(backend_);
+    SequenceState another(backend_);
+    ASSERT_TRUE(one.Next(request).ok());
+    EXPECT_EQ(upload_memory_.used(), 600000U);
+    const auto refused = another.Next(request);
+    EXPECT_EQ(refused.status().code(), absl::StatusCode::kResourceExhausted);
+    EXPECT_EQ(DetailOf(refused.status()).reason, v1::ERROR_REASON_UPLOAD_MEMORY_FULL);
+    EXPECT_TRUE(DetailOf(refused.status()).retry_after.has_value());
+    particles = MakeParticles(10, {v1::PARTICLE_ATTRIBUTE_POSITION});
+    EXPECT_TRUE(one.Next(request).ok());
+    EXPECT_EQ(upload_memory_.used(), 120U);
+  }
+  EXPECT_EQ(upload_memory_.used(), 0U);
 }
 
 TEST_F(Sequence, MeasurementIsKeptUntilAnotherTakesItsPlace) {
@@ -576,7 +596,7 @@ TEST_F(Sequence, UnreadableRequestEndsTheStreamAfterTheFramesBeforeIt) {
   handler_->Start();
   handler_->OnRequest(Wrap(MakeRequest()));
   ASSERT_TRUE(WaitFor([&] { return sink_.reads() == 2; }));
-  handler_->OnUnreadableRequest();
+  handler_->OnUnreadableRequest(FieldError("message", "bytes that are none", "others"));
   while (sink_.WaitForWrite()) {
     handler_->OnWritten(true);
   }

@@ -394,6 +394,30 @@ TEST_F(Service, MalformedRequestsForFramesAreRefused) {
             "frame 0: message: bytes that are none, allowed: a RenderSequenceRequest");
 }
 
+TEST_F(Service, MessageThatWouldTakeManyTimesItsBytesIsRefused) {
+  v1::RenderFrameRequest request = MakeRequest();
+  for (int i = 0; i < 10000; ++i) {
+    request.add_outputs();
+  }
+  const grpc::Status status = RenderAll(request);
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
+  EXPECT_THAT(status.error_message(), ::testing::StartsWith("message: one that takes "));
+  v1::FindMissingParticlesRequest question;
+  for (int i = 0; i < 10000; ++i) {
+    question.add_sha256();
+  }
+  grpc::ClientContext context;
+  v1::FindMissingParticlesResponse missing;
+  EXPECT_EQ(stub_->FindMissingParticles(&context, question, &missing).error_code(),
+            grpc::StatusCode::INVALID_ARGUMENT);
+  // What particles take is as much as they are sent in.
+  *request.mutable_outputs() = MakeRequest().outputs();
+  *request.mutable_scene()->mutable_inline_particles() =
+      MakeParticles(100000, {v1::PARTICLE_ATTRIBUTE_POSITION});
+  request.mutable_scene()->mutable_material()->set_radius(0.1F);
+  EXPECT_TRUE(RenderAll(request).ok());
+}
+
 TEST_F(Service, InvalidRequestNamesTheField) {
   v1::RenderFrameRequest request = MakeRequest();
   request.mutable_scene()->mutable_camera()->mutable_perspective()->set_vertical_fov_deg(200);

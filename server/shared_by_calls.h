@@ -1,0 +1,34 @@
+// What all calls of a service share, and what becomes of those whose peers keep them waiting.
+#pragma once
+
+#include <chrono>
+#include <functional>
+
+#include "server/call_token.h"
+#include "server/handlers/backend.h"
+#include "server/listen/connections.h"
+#include "server/open_sequences.h"
+#include "server/timer.h"
+
+namespace halflight {
+
+struct SharedByCalls {
+  SharedByCalls(const Backend& the_backend, const Access& the_access, Connections& the_connections)
+      : backend(the_backend), access(the_access), connections(the_connections) {}
+
+  [[nodiscard]] std::chrono::milliseconds stall_limit() const {
+    return std::chrono::seconds(backend.limits.max_stall_seconds);
+  }
+  // What becomes of a call whose peer stalls: it is cancelled, and where that does nothing, its
+  // connection is ended. For a StallGuard.
+  std::function<void()> EndForStall(CallToken& token);
+
+  const Backend backend;
+  const Access& access;
+  Connections& connections;
+  CallCount count;
+  Timer timer;
+  OpenSequences sequences;
+};
+
+}  // namespace halflight
