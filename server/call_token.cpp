@@ -95,6 +95,7 @@ CallToken::~CallToken() {
   if (entered_) {
     count_.Leave(caller_.client());
   }
+  count_.stalled -= stalled_ ? 1 : 0;
   --count_.active_of[static_cast<size_t>(rpc_)];
   --count_.active;
 }
@@ -145,6 +146,7 @@ void CallToken::OnSent(size_t bytes) {
 
 void CallToken::EndForStall(std::chrono::seconds waited) {
   stalled_ = true;
+  ++count_.stalled;
   Log(LogLevel::kWarn, "call_stalled",
       {{"rpc", NameOf(rpc_)},
        {"request_id", caller_.call_id},

@@ -25,6 +25,7 @@ namespace halflight {
 struct CallCount {
   std::atomic<int> active = 0;
   std::array<std::atomic<int>, kRpcs> active_of{};
+  std::atomic<int> stalled = 0;  // of the active: those that should have ended for it
   std::atomic<uint64_t> begun = 0;
   std::atomic<bool> draining = false;
 

@@ -3,20 +3,26 @@
 #include <algorithm>
 
 namespace halflight {
-namespace {
 
-// What a call has to end in, once it is cancelled.
-constexpr std::chrono::milliseconds kToEnd{5000};
-
-}  // namespace
-
-std::function<void()> SharedByCalls::EndForStall(CallToken& token) {
+std::function<void()> SharedByCalls::StallEnder(CallToken& token) {
   return [this, &token] {
-    const auto to_end = std::min(kToEnd, stall_limit());
-    connections.HangUpOnStalled(to_end);
-    timer.At(Timer::Clock::now() + to_end, [this, to_end] { connections.HangUpOnStalled(to_end); });
     token.EndForStall(std::chrono::duration_cast<std::chrono::seconds>(stall_limit()));
+    if (!looking_.exchange(true)) {
+      LookAtConnections();
+    }
   };
+}
+
+// On the timer's thread, where all calls stall: again and again, until none is left that did.
+void SharedByCalls::LookAtConnections() {
+  using std::chrono::milliseconds;
+  if (count.stalled == 0) {
+    looking_ = false;
+    return;
+  }
+  const auto apart = std::clamp(stall_limit() / 20, milliseconds(1), milliseconds(1000));
+  connections_.CutOffStalled(stall_limit(), apart);
+  timer.At(Timer::Clock::now() + apart, [this] { LookAtConnections(); });
 }
 
 }  // namespace halflight

@@ -1,6 +1,7 @@
 // What all calls of a service share, and what becomes of those whose peers keep them waiting.
 #pragma once
 
+#include <atomic>
 #include <chrono>
 #include <functional>
 
@@ -12,23 +13,29 @@
 
 namespace halflight {
 
-struct SharedByCalls {
-  SharedByCalls(const Backend& the_backend, const Access& the_access, Connections& the_connections)
-      : backend(the_backend), access(the_access), connections(the_connections) {}
+class SharedByCalls {
+ public:
+  SharedByCalls(const Backend& the_backend, const Access& the_access, Connections& connections)
+      : backend(the_backend), access(the_access), connections_(connections) {}
 
   [[nodiscard]] std::chrono::milliseconds stall_limit() const {
     return std::chrono::seconds(backend.limits.max_stall_seconds);
   }
-  // What becomes of a call whose peer stalls: it is cancelled, and where that does nothing, its
-  // connection is ended. For a StallGuard.
-  std::function<void()> EndForStall(CallToken& token);
+  // For a StallGuard: what ends the token's call. It is cancelled, and where that does nothing its
+  // connection is cut off, once that too has stalled for the limit.
+  std::function<void()> StallEnder(CallToken& token);
 
   const Backend backend;
   const Access& access;
-  Connections& connections;
   CallCount count;
   Timer timer;
   OpenSequences sequences;
+
+ private:
+  void LookAtConnections();
+
+  Connections& connections_;
+  std::atomic<bool> looking_ = false;
 };
 
 }  // namespace halflight

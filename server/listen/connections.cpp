@@ -1,5 +1,7 @@
 #include "server/listen/connections.h"
 
+#include <utility>
+
 #include <linux/sockios.h>
 #include <linux/tcp.h>
 #include <netinet/in.h>
@@ -62,15 +64,16 @@ void Connections::ShutDown(int how) {
   }
 }
 
-void Connections::HangUpOnStalled(std::chrono::milliseconds at_least) {
+void Connections::CutOffStalled(std::chrono::milliseconds limit, std::chrono::milliseconds apart) {
   const std::lock_guard lock(mutex_);
   ForgetClosed();
+  const bool first = looked_ - std::exchange(looked_for_stalled_, looked_) > 3 * apart;
   for (auto& [fd, connection] : open_) {
     const Backlog backlog = BacklogOf(fd);
-    if (backlog.unread == 0 || backlog != connection.backlog) {
+    if (first || backlog.unread == 0 || backlog != connection.backlog) {
       connection.backlog = backlog;
       connection.since = looked_;
-    } else if (looked_ - connection.since >= at_least) {
+    } else if (looked_ - connection.since >= limit) {
       shutdown(fd, SHUT_RDWR);
     }
   }

@@ -30,17 +30,18 @@ class Connections {
   // Nothing more is received over those that are open: who serves them finds that their peers are
   // gone, and closes them.
   void HangUp();
-  // Nothing is sent either, not even what waits for peers that take nothing.
+  // Nothing more is sent either: what waits for peers that take nothing is let go of.
   void CutOff();
 
-  // Ends those whose peers have left unread what was sent to them and have taken nothing of it from
-  // one call of this to another that came `at_least` later.
+  // Of those whose peers have left unread what was sent to them and have taken nothing of it for
+  // `limit`, as far as looks tell: to be called again and again, `apart` from one another. What was
+  // seen before a longer pause does not count.
   //
   // gRPC 1.51 cancels no call while it writes to the call's socket, and so not at all where that is
   // full and the peer's kernel alone answers for it: a process that was stopped, or one that reads
   // nothing. Only when the socket ends do the calls. (Can go when gRPC fails what waits behind a
   // write without waiting for the write.)
-  void HangUpOnStalled(std::chrono::milliseconds at_least);
+  void CutOffStalled(std::chrono::milliseconds limit, std::chrono::milliseconds apart);
 
  private:
   using Clock = std::chrono::steady_clock;
@@ -65,6 +66,7 @@ class Connections {
   std::unordered_map<int, Connection> open_;  // by descriptor
   uint64_t added_ = 0;
   Clock::time_point looked_;
+  Clock::time_point looked_for_stalled_;
 };
 
 }  // namespace halflight

@@ -1,8 +1,6 @@
 #include "server/metrics/metrics_server.h"
 
 #include <chrono>
-#include <mutex>
-#include <set>
 #include <string_view>
 #include <utility>
 
@@ -90,11 +88,7 @@ class Server final : public MetricsServer {
   Server(Page page, std::chrono::seconds patience) : page_(std::move(page)), patience_(patience) {}
   ~Server() override {
     acceptor_.reset();
-    const std::lock_guard lock(mutex_);
-    closing_ = true;
-    for (const int fd : open_) {
-      shutdown(fd, SHUT_RDWR);
-    }
+    connections_.CutOff();
   }
   Server(const Server&) = delete;
   Server& operator=(const Server&) = delete;
@@ -115,26 +109,14 @@ class Server final : public MetricsServer {
 
  private:
   void Serve(int fd) {
-    {
-      const std::lock_guard lock(mutex_);
-      if (closing_) {
-        return;
-      }
-      open_.insert(fd);
-    }
     const auto until = Clock::now() + patience_;
     if (const std::string head = ReadHead(fd, until); !head.empty()) {
       Send(fd, AnswerTo(head, page_), until);
     }
-    const std::lock_guard lock(mutex_);
-    open_.erase(fd);
   }
 
   const Page page_;
   const std::chrono::seconds patience_;
-  std::mutex mutex_;
-  bool closing_ = false;
-  std::set<int> open_;
   Connections connections_;
   WorkerPool workers_{kThreads};
   std::unique_ptr<Acceptor> acceptor_;

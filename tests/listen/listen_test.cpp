@@ -10,11 +10,15 @@
 #include <vector>
 
 #include <fcntl.h>
+#include <linux/sockios.h>
+#include <sys/ioctl.h>
 #include <sys/resource.h>
+#include <sys/socket.h>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "server/file_descriptor.h"
 #include "server/listen/acceptor.h"
 #include "server/listen/connections.h"
 #include "server/listen/listening_socket.h"
@@ -215,45 +219,104 @@ TEST(Connections, CountWhatIsOpenWhoeverHasTheDescriptorsNow) {
   EXPECT_EQ(connections.Count(), 0U);
 }
 
-TEST(Connections, OfThoseThatTakeNothingAreEnded) {
-  using std::chrono::milliseconds;
-  Connections connections;
-  struct Pair {
-    int ours = -1;
-    int theirs = -1;
-  };
-  std::vector<Pair> pairs(3);
-  for (Pair& pair : pairs) {
+using std::chrono::milliseconds;
+
+// Two ends of a connection, of which ours does not block.
+struct SocketPair {
+  SocketPair() {
     int fds[2];
-    ASSERT_EQ(socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0, fds), 0);
-    pair = {fds[0], fds[1]};
-    ASSERT_TRUE(connections.Add(pair.ours, 10));
+    EXPECT_EQ(socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0, fds), 0);
+    ours = fds[0];
+    theirs = fds[1];
   }
-  const Pair stopped = pairs[0];
-  const Pair slow = pairs[1];
-  const Pair idle = pairs[2];
-  const auto ended = [](const Pair& pair) {
-    return send(pair.ours, "x", 1, MSG_NOSIGNAL) < 0 && errno == EPIPE;
-  };
-  const std::string part(10000, 'x');
-  for (const Pair& pair : {stopped, slow}) {
+  ~SocketPair() {
+    close(ours);
+    close(theirs);
+  }
+  SocketPair(const SocketPair&) = delete;
+  SocketPair& operator=(const SocketPair&) = delete;
+
+  [[nodiscard]] bool IsCutOff() const {
+    pollfd polled{.fd = ours, .events = 0, .revents = 0};
+    return poll(&polled, 1, 0) == 1 && (polled.revents & POLLHUP) != 0;
+  }
+
+  int ours = -1;
+  int theirs = -1;
+};
+
+TEST(Connections, OfThoseThatTakeNothingAreCutOff) {
+  const SocketPair stopped;
+  const SocketPair slow;
+  const SocketPair idle;
+  Connections connections;
+  for (const SocketPair* pair : {&stopped, &slow, &idle}) {
+    ASSERT_TRUE(connections.Add(pair->ours, 10));
+  }
+  std::string part(10000, 'x');
+  const auto size = static_cast<ssize_t>(part.size());
+  for (const SocketPair* pair : {&stopped, &slow}) {
     for (int i = 0; i < 3; ++i) {
-      ASSERT_EQ(write(pair.ours, part.data(), part.size()), static_cast<ssize_t>(part.size()));
+      ASSERT_EQ(write(pair->ours, part.data(), part.size()), size);
     }
   }
-  connections.HangUpOnStalled(milliseconds(20));
-  connections.HangUpOnStalled(milliseconds(20));
+  connections.CutOffStalled(milliseconds(20), std::chrono::minutes(1));
+  connections.CutOffStalled(milliseconds(20), std::chrono::minutes(1));
   std::this_thread::sleep_for(milliseconds(30));
-  std::string taken(part.size(), '\0');
-  ASSERT_EQ(read(slow.theirs, taken.data(), taken.size()), static_cast<ssize_t>(taken.size()));
-  connections.HangUpOnStalled(milliseconds(20));
-  EXPECT_TRUE(ended(stopped));
-  EXPECT_FALSE(ended(slow));
-  EXPECT_FALSE(ended(idle));
-  for (const Pair& pair : pairs) {
-    close(pair.ours);
-    close(pair.theirs);
+  ASSERT_EQ(read(slow.theirs, part.data(), part.size()), size);
+  connections.CutOffStalled(milliseconds(20), milliseconds(1));
+  EXPECT_FALSE(stopped.IsCutOff()) << "that was long ago";
+  std::this_thread::sleep_for(milliseconds(30));
+  ASSERT_EQ(read(slow.theirs, part.data(), part.size()), size);
+  connections.CutOffStalled(milliseconds(20), std::chrono::minutes(1));
+  EXPECT_TRUE(stopped.IsCutOff());
+  EXPECT_FALSE(slow.IsCutOff());
+  EXPECT_FALSE(idle.IsCutOff());
+}
+
+int UnreadOf(int fd) {
+  int bytes = 0;
+  ioctl(fd, SIOCOUTQ, &bytes);
+  return bytes;
+}
+
+// What is sent as fast as it is taken is never less.
+TEST(Connections, OfThoseThatTakeSomethingStayWhateverIsLeft) {
+  auto sockets = ListeningSocket::Bind("127.0.0.1:0");
+  ASSERT_TRUE(sockets.ok() && sockets->front().Listen().ok());
+  ClientSocket client;
+  const int room = 4096;
+  setsockopt(client.fd(), SOL_SOCKET, SO_RCVBUF, &room, sizeof(room));
+  ASSERT_TRUE(client.Connect(sockets->front().address()));
+  const FileDescriptor ours(
+      accept4(sockets->front().fd(), nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC));
+  ASSERT_TRUE(ours.ok());
+  Connections connections;
+  ASSERT_TRUE(connections.Add(ours.get(), 1));
+  std::string bytes(1 << 16, 'x');
+  int unread = -1;
+  ASSERT_EQ(write(ours.get(), bytes.data(), bytes.size()), static_cast<ssize_t>(bytes.size()));
+  ASSERT_TRUE(WaitFor([&] {
+    const int was = unread;
+    unread = UnreadOf(ours.get());
+    return unread > 0 && unread == was;
+  }));
+  const int before = unread;
+  for (int i = 0; i < 3; ++i) {
+    connections.CutOffStalled(milliseconds(20), std::chrono::minutes(1));
+    std::this_thread::sleep_for(milliseconds(30));
+    ASSERT_TRUE(WaitFor([&] {
+      EXPECT_GE(recv(client.fd(), bytes.data(), 64, MSG_DONTWAIT), -1);
+      return UnreadOf(ours.get()) < before;
+    }));
+    while (UnreadOf(ours.get()) < before) {
+      const auto missing = static_cast<size_t>(before - UnreadOf(ours.get()));
+      ASSERT_GT(send(ours.get(), bytes.data(), std::min(missing, bytes.size()), MSG_NOSIGNAL), 0);
+    }
+    ASSERT_EQ(UnreadOf(ours.get()), before);
   }
+  connections.CutOffStalled(milliseconds(20), std::chrono::minutes(1));
+  EXPECT_EQ(send(ours.get(), "x", 1, MSG_NOSIGNAL), 1);
 }
 
 TEST(ListeningSocket, TellsWhereItIsAndWhetherOthersCanConnect) {
