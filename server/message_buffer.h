@@ -12,6 +12,7 @@
 
 #include "absl/status/statusor.h"
 #include "halflight/v1/frame.pb.h"
+#include "halflight/v1/particles.pb.h"
 #include "halflight/v1/service.pb.h"
 #include "server/handlers/sink.h"
 
@@ -24,10 +25,13 @@ constexpr size_t kMaxReadBytes = size_t{256} << 10U;
 // Of particles that a request carries.
 inline size_t CarriedBytes(const google::protobuf::Message& /*other*/) { return 0; }
 inline size_t CarriedBytes(const v1::RenderFrameRequest& request) {
-  return request.scene().inline_particles().payload().size();
+  return request.scene().inline_particles().payload().capacity();
 }
 inline size_t CarriedBytes(const v1::RenderSequenceRequest& request) {
   return CarriedBytes(request.frame());
+}
+inline size_t CarriedBytes(const v1::UploadParticlesRequest& request) {
+  return request.chunk().capacity();
 }
 
 absl::Status UnreadableMessage(const google::protobuf::Message& wanted);

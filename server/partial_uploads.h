@@ -29,7 +29,9 @@ struct PartialUpload {
       : header(checked),
         tenant(uploader.tenant),
         assembler(header.layout(), header.byte_size()),
-        memory(budget, uploader.client()) {}
+        memory(budget, uploader.client()) {
+    header.DiscardUnknownFields();  // it is kept as long as the upload
+  }
 
   v1::ParticleSetDescription header;
   std::string tenant;  // "" where nothing says who it is

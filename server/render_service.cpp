@@ -18,10 +18,10 @@ using grpc::ByteBuffer;
 using grpc::CallbackServerContext;
 
 using Rpcs = v1::RenderService;
-// All but uploads in bytes: what is read of them is bounded, and what is sent need not be copied.
+// All in bytes: what is read of them is bounded, and what is sent need not be copied.
 using CallbackService = Rpcs::WithRawCallbackMethod_GetServerInfo<
     Rpcs::WithRawCallbackMethod_FindMissingParticles<Rpcs::WithRawCallbackMethod_QueryUpload<
-        Rpcs::WithCallbackMethod_UploadParticles<Rpcs::WithRawCallbackMethod_RenderFrame<
+        Rpcs::WithRawCallbackMethod_UploadParticles<Rpcs::WithRawCallbackMethod_RenderFrame<
             Rpcs::WithRawCallbackMethod_RenderSequence<Rpcs::Service>>>>>>;
 
 // gRPC made it for the call, and looks at it no more.
@@ -70,8 +70,8 @@ class RenderService::Calls final : public CallbackService {
                                           });
   }
 
-  grpc::ServerReadReactor<v1::UploadParticlesRequest>* UploadParticles(
-      CallbackServerContext* context, v1::UploadParticlesResponse* response) override {
+  grpc::ServerReadReactor<ByteBuffer>* UploadParticles(CallbackServerContext* context,
+                                                       ByteBuffer* response) override {
     return NewUploadCall(shared_, *context, *response);
   }
 

@@ -20,14 +20,13 @@ namespace {
 
 using grpc::CallbackServerContext;
 
-class UploadCall final : public grpc::ServerReadReactor<v1::UploadParticlesRequest> {
+class UploadCall final : public grpc::ServerReadReactor<grpc::ByteBuffer> {
  public:
-  UploadCall(SharedByCalls& shared, CallbackServerContext& context,
-             v1::UploadParticlesResponse& response)
+  UploadCall(SharedByCalls& shared, CallbackServerContext& context, grpc::ByteBuffer& response)
       : token_(Rpc::kUploadParticles, shared.count, shared.backend, shared.access, context),
         response_(response),
         handler_(shared.backend, token_.caller()),
-        stall_(shared.timer, shared.stall_limit(), shared.EndForStall(token_)) {
+        stall_(shared.timer, shared.stall_limit(), shared.StallEnder(token_)) {
     if (!token_.refusal().ok()) {
       Answer(token_.refusal());
     } else {
@@ -41,8 +40,11 @@ class UploadCall final : public grpc::ServerReadReactor<v1::UploadParticlesReque
       Answer(handler_.OnEndOfRequests());
       return;
     }
-    token_.OnReceived(request_.ByteSizeLong());
-    if (const auto answer = handler_.OnRequest(request_)) {
+    token_.OnReceived(request_.Length());
+    const auto request = TakeMessage<v1::UploadParticlesRequest>(request_);
+    if (!request.ok()) {
+      Answer(request.status());
+    } else if (const auto answer = handler_.OnRequest(*request)) {
       Answer(*answer);
     } else {
       Read();
@@ -59,7 +61,7 @@ class UploadCall final : public grpc::ServerReadReactor<v1::UploadParticlesReque
 
   void Answer(const UploadParticlesHandler::Answer& answer) {
     if (answer.ok()) {
-      response_ = *answer;
+      response_ = JoinWithoutCopying(answer->SerializeAsString(), {});
     }
     const grpc::Status status = token_.End(answer.status());
     stall_.Begin();  // of a peer that reads nothing: until OnDone the call counts
@@ -67,10 +69,10 @@ class UploadCall final : public grpc::ServerReadReactor<v1::UploadParticlesReque
   }
 
   CallToken token_;
-  v1::UploadParticlesResponse& response_;
+  grpc::ByteBuffer& response_;
   UploadParticlesHandler handler_;
   StallGuard stall_;
-  v1::UploadParticlesRequest request_;
+  grpc::ByteBuffer request_;
 };
 
 // A call that sends frames: what both kinds have in common.
@@ -94,7 +96,7 @@ class SendingCall : public Reactor, public Sink<Response> {
   SendingCall(Rpc rpc, SharedByCalls& shared, CallbackServerContext& context,
               const std::string& request_id)
       : token_(rpc, shared.count, shared.backend, shared.access, context, request_id),
-        stall_(shared.timer, shared.stall_limit(), shared.EndForStall(token_)),
+        stall_(shared.timer, shared.stall_limit(), shared.StallEnder(token_)),
         handler_(std::make_shared<Handler>(shared.backend, *this, token_.caller())) {}
 
   void Write(const OutgoingMessage<Response>& outgoing) override {
@@ -171,8 +173,9 @@ class RenderSequenceCall final
 
 }  // namespace
 
-grpc::ServerReadReactor<v1::UploadParticlesRequest>* NewUploadCall(
-    SharedByCalls& shared, CallbackServerContext& context, v1::UploadParticlesResponse& response) {
+grpc::ServerReadReactor<grpc::ByteBuffer>* NewUploadCall(SharedByCalls& shared,
+                                                         CallbackServerContext& context,
+                                                         grpc::ByteBuffer& response) {
   return new UploadCall(shared, context, response);
 }
 

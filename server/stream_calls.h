@@ -13,9 +13,9 @@ namespace halflight {
 
 // Each deletes itself when its call has ended; `shared` outlives it. The bytes of a request are let
 // go of, which gRPC would keep as long as the call.
-grpc::ServerReadReactor<v1::UploadParticlesRequest>* NewUploadCall(
-    SharedByCalls& shared, grpc::CallbackServerContext& context,
-    v1::UploadParticlesResponse& response);
+grpc::ServerReadReactor<grpc::ByteBuffer>* NewUploadCall(SharedByCalls& shared,
+                                                         grpc::CallbackServerContext& context,
+                                                         grpc::ByteBuffer& response);
 grpc::ServerWriteReactor<grpc::ByteBuffer>* NewRenderFrameCall(SharedByCalls& shared,
                                                                grpc::CallbackServerContext& context,
                                                                grpc::ByteBuffer& request);

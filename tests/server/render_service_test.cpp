@@ -383,7 +383,12 @@ TEST_F(Service, CompressedMessagesAreRefused) {
             grpc::StatusCode::UNIMPLEMENTED);
 }
 
-TEST_F(Service, MalformedRequestsForFramesAreRefused) {
+TEST_F(Service, MalformedRequestsAreRefused) {
+  for (const std::string rpc : {"GetServerInfo", "UploadParticles"}) {
+    const grpc::Status status = Send(rpc, {kMalformed});
+    EXPECT_EQ(status.error_code(), grpc::StatusCode::INVALID_ARGUMENT) << rpc;
+    EXPECT_THAT(status.error_message(), HasSubstr("message: bytes that are none, allowed: a "));
+  }
   const grpc::Status of_frame = Send("RenderFrame", {kMalformed});
   EXPECT_EQ(of_frame.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
   EXPECT_EQ(of_frame.error_message(),
@@ -408,8 +413,14 @@ TEST_F(Service, MessageThatWouldTakeManyTimesItsBytesIsRefused) {
   }
   grpc::ClientContext context;
   v1::FindMissingParticlesResponse missing;
-  EXPECT_EQ(stub_->FindMissingParticles(&context, question, &missing).error_code(),
-            grpc::StatusCode::INVALID_ARGUMENT);
+  EXPECT_THAT(stub_->FindMissingParticles(&context, question, &missing).error_message(),
+              ::testing::StartsWith("message: one that takes "));
+  v1::UploadParticlesRequest upload;
+  for (int i = 0; i < 300000; ++i) {
+    upload.mutable_header()->mutable_layout()->add_attributes(v1::PARTICLE_ATTRIBUTE_RADIUS);
+  }
+  EXPECT_THAT(Send("UploadParticles", {upload.SerializeAsString()}).error_message(),
+              ::testing::StartsWith("message: one that takes "));
   // What particles take is as much as they are sent in.
   *request.mutable_outputs() = MakeRequest().outputs();
   *request.mutable_scene()->mutable_inline_particles() =
