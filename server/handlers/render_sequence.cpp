@@ -46,6 +46,7 @@ void RenderSequenceHandler::Take(absl::StatusOr<FrameJob> job, const std::string
     }
     if (job.ok()) {
       waiting_ = *std::move(job);
+      waiting_->request.scene.particles.reset();  // a frame that waits keeps no set from going
       waiting_->caller = caller_;
       waiting_->request_id = FrameName(request_id, slots_.back()->index);
       may_submit_ = true;
@@ -78,10 +79,15 @@ void RenderSequenceHandler::Submit() {
   const std::shared_ptr<Slot> slot = slots_.back();
   FrameJob job = *waiting_;
   lock.unlock();
-  const absl::Status status = backend_.pipeline.Submit(
-      std::move(job), stop_.get_token(), [self = shared_from_this(), slot](FrameOrError frame) {
-        self->OnFrame(*slot, std::move(frame));
-      });
+  const auto particles = state_.Particles();
+  absl::Status status = particles.status();
+  if (particles.ok()) {
+    job.request.scene.particles = particles->set;
+    status = backend_.pipeline.Submit(std::move(job), stop_.get_token(),
+                                      [self = shared_from_this(), slot](FrameOrError frame) {
+                                        self->OnFrame(*slot, std::move(frame));
+                                      });
+  }
   lock.lock();
   // With frames of its own before it, or just sent, the stream tries again.
   if (absl::IsResourceExhausted(status) && (slots_.size() > 1 || may_submit_)) {

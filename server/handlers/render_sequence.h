@@ -84,7 +84,8 @@ class RenderSequenceHandler : public std::enable_shared_from_this<RenderSequence
   const Caller caller_;
   std::stop_source stop_;
 
-  // Touched only by the thread that completes a read; reads are one at a time.
+  // Touched only by the thread that completes a read, reads being one at a time, and by that which
+  // submits a frame, before the next read.
   SequenceState state_;
   uint64_t next_index_ = 0;
 

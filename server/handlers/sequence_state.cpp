@@ -9,6 +9,7 @@
 namespace halflight {
 
 absl::Status SequenceState::Hold(NamedParticles brought) {
+  inline_.reset();
   inline_memory_.Release();
   const uint64_t bytes = MemoryBytes(*brought.set);
   const auto growth = backend_.partial_uploads.Grow(inline_memory_, bytes);
@@ -36,8 +37,7 @@ absl::StatusOr<FrameJob> SequenceState::Next(const v1::RenderFrameRequest& reque
     inline_.reset();
     inline_memory_.Release();
   }
-  const auto particles =
-      inline_.has_value() ? *inline_ : ResolveParticles(merged, backend_.store, backend_.limits);
+  const auto particles = Particles();
   if (!particles.ok()) {
     return particles.status();
   }
@@ -83,6 +83,13 @@ absl::StatusOr<FrameJob> SequenceState::Next(const v1::RenderFrameRequest& reque
     job->target->knowledge = knowledge_;
   }
   return job;
+}
+
+absl::StatusOr<NamedParticles> SequenceState::Particles() {
+  if (inline_.has_value()) {
+    return *inline_;
+  }
+  return ResolveParticles(merged_.scene(), backend_.store, backend_.limits);
 }
 
 const std::string& SequenceState::SetWanted(const v1::Scene& scene) const {

@@ -28,6 +28,10 @@ class SequenceState {
   // ResourceExhausted where there is no room for particles that it carries.
   absl::StatusOr<FrameJob> Next(const v1::RenderFrameRequest& request);
 
+  // The particles of the last request that there was a job for, which need not hold them meanwhile:
+  // the store may have dropped them, NotFound.
+  absl::StatusOr<NamedParticles> Particles();
+
   // The name of the set in the store that a request with this scene is about; "" where there is
   // none.
   [[nodiscard]] const std::string& SetWanted(const v1::Scene& scene) const;

@@ -432,6 +432,33 @@ TEST_F(Sequence, PriorityIsThatOfTheRequestItself) {
   EXPECT_THAT(std::string(state.Next(same).status().message()), HasSubstr("priority: 101"));
 }
 
+TEST_F(Sequence, FrameThatWaitsForAPlaceKeepsNoSetFromGoing) {
+  FramePipeline full(
+      engine_, {.admission = {.max_queued_frames = 1}, .encode_threads = 1, .encode = EncodePlain});
+  const Backend backend{engine_.device(), limits_, version_, store_, partial_uploads_, full};
+  engine_.SetGate(false);
+  const auto brought = BuildInlineParticles(MakeRequest().scene().inline_particles(), limits_);
+  ASSERT_TRUE(store_.Insert(brought->sha256, brought->set).ok());
+  v1::RenderSequenceRequest named;
+  *named.mutable_frame() = MakeRequest();
+  named.mutable_frame()->mutable_scene()->set_particle_sha256(brought->sha256);
+  FakeSink<v1::RenderSequenceResponse> sink;
+  const auto handler = std::make_shared<RenderSequenceHandler>(backend, sink);
+  handler->Start();
+  handler->OnRequest(Wrap(MakeRequest()));
+  ASSERT_TRUE(WaitFor([&] { return full.queued() == 1 && sink.reads() == 2; }));
+  handler->OnRequest(named);
+  EXPECT_EQ(brought->set.use_count(), 2) << "the store's and this test's";
+  engine_.SetGate(true);
+  for (int frames = 0; frames < 2;) {
+    ASSERT_TRUE(sink.WaitForWrite());
+    frames += sink.written().back().has_trailer() ? 1 : 0;
+    handler->OnWritten(true);
+  }
+  EXPECT_EQ(engine_.last_request().scene.particles, brought->set);
+  handler->OnEndOfRequests();
+}
+
 TEST_F(Sequence, ParticlesThatItCarriesCountUntilOthersTakeTheirPlace) {
   v1::RenderFrameRequest request = MakeRequest();
   v1::InlineParticles& particles = *request.mutable_scene()->mutable_inline_particles();
