@@ -32,6 +32,9 @@ ByteBudget::Growth ByteBudget::Take(const std::string& client, uint64_t bytes) {
 }
 
 void ByteBudget::GiveBack(const std::string& client, uint64_t bytes) {
+  if (bytes == 0) {
+    return;
+  }
   const std::lock_guard lock(mutex_);
   used_ -= bytes;
   const auto own = used_by_.find(client);

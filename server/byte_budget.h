@@ -47,6 +47,15 @@ class ByteBudget {
       return growth;
     }
 
+    // From now on it is this client's; unless there is no room for it once more, when nothing
+    // changes.
+    void PassTo(const std::string& client) {
+      if (client != client_ && budget_.Take(client, taken_) == Growth::kDone) {
+        budget_.GiveBack(client_, taken_);
+        client_ = client;
+      }
+    }
+
     // Gives back what is beyond `bytes`.
     void ShrinkTo(uint64_t bytes) {
       if (bytes < taken_) {
@@ -59,7 +68,7 @@ class ByteBudget {
 
    private:
     ByteBudget& budget_;
-    const std::string client_;
+    std::string client_;
     uint64_t taken_ = 0;
   };
 

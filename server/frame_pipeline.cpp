@@ -56,7 +56,8 @@ double QueueMilliseconds(const FrameResult& result) {
 }
 
 PinnedSet SetOf(const FrameJob& job) {
-  return {job.particle_sha256, MemoryBytes(*job.request.scene.particles)};
+  const auto& set = job.request.scene.particles;
+  return {set.get(), MemoryBytes(*set)};
 }
 
 }  // namespace

@@ -145,9 +145,10 @@ void AddLimitFlags(CLI::App& app, Options& options) {
       "Bytes of all particle sets kept in memory, and as many again of all uploads in progress or "
       "broken off");
   bytes("--max-client-set-bytes", limits.max_client_set_bytes,
-        "Of these, those of sets that one client's frames need");
+        "Of these, those of sets that one client's frames need; three quarters if unset");
   bytes("--max-client-upload-bytes", limits.max_client_upload_bytes,
-        "Bytes of one client's uploads in progress or broken off");
+        "Bytes of one client's uploads, and of particles that its sequences were sent inline; "
+        "three quarters of --max-cache-bytes if unset");
   bytes("--max-cache-dir-bytes", limits.max_cache_dir_bytes, "Bytes of all particle sets on disk")
       ->needs(cache_dir);
   number("--max-partial-uploads", limits.max_partial_uploads,
@@ -177,7 +178,7 @@ void AddLimitFlags(CLI::App& app, Options& options) {
   bytes("--max-frame-bytes", limits.max_frame_bytes,
         "Pixels and files of all frames from when they are accepted until they are sent");
   bytes("--max-client-frame-bytes", limits.max_client_frame_bytes,
-        "Of these, those of one client's frames");
+        "Of these, those of one client's frames; three quarters if unset");
   number("--max-frame-seconds", limits.max_frame_seconds,
          "How long a frame may take once its rendering has begun, without what it waits for other "
          "frames meanwhile; 0: no limit");
@@ -341,6 +342,17 @@ absl::StatusOr<std::optional<Options>> ParseOptions(int argc, const char* const*
   } catch (const CLI::ParseError& error) {
     return absl::InvalidArgumentError(ParseMessage(error, config->as<std::string>()));
   }
+  // Where nothing is said of it a client's share is three quarters, and enough for one.
+  ServerLimits& limits = options.limits;
+  const auto share = [&](const char* flag, uint64_t& value, uint64_t whole, uint64_t one) {
+    value = app.count(flag) > 0 ? value : std::max(whole / 4 * 3, one);
+  };
+  share("--max-client-frame-bytes", limits.max_client_frame_bytes, limits.max_frame_bytes,
+        limits.max_output_bytes);
+  share("--max-client-set-bytes", limits.max_client_set_bytes, limits.max_cache_bytes,
+        limits.max_particle_bytes);
+  share("--max-client-upload-bytes", limits.max_client_upload_bytes, limits.max_cache_bytes,
+        limits.max_particle_bytes);
   if (absl::Status status = Check(options); !status.ok()) {
     return status;
   }

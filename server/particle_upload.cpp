@@ -83,6 +83,7 @@ absl::Status ParticleUpload::Begin(const v1::ParticleSetDescription& header) {
     return kept.status();
   }
   upload_ = *std::move(kept);
+  upload_->memory.PassTo(caller_.client());
   at_ = header.resume_offset();
   return absl::OkStatus();
 }

@@ -5,13 +5,14 @@
 #include <cstdint>
 #include <map>
 #include <string>
-#include <utility>
+
+#include "renderer/scene.h"
 
 namespace halflight {
 
-// A set as a frame needs it.
+// A set that a frame holds.
 struct PinnedSet {
-  std::string sha256;
+  const ParticleSet* set = nullptr;
   uint64_t bytes = 0;
 };
 
@@ -23,22 +24,22 @@ class PinnedSets {
   [[nodiscard]] uint64_t BytesWith(const std::string& client, const PinnedSet& set) const {
     uint64_t bytes = 0;
     if (const auto own = of_.find(client); own != of_.end()) {
-      for (const auto& [sha256, pins] : own->second) {
-        bytes += sha256 == set.sha256 ? 0 : pins.bytes;
+      for (const auto& [pinned, pins] : own->second) {
+        bytes += pinned == set.set ? 0 : pins.bytes;
       }
     }
     return bytes + set.bytes;
   }
 
   void Pin(const std::string& client, const PinnedSet& set) {
-    Pins& pins = of_[client][set.sha256];
+    Pins& pins = of_[client][set.set];
     pins.bytes = set.bytes;
     ++pins.frames;
   }
   // One that was pinned.
   void Unpin(const std::string& client, const PinnedSet& set) {
     const auto own = of_.find(client);
-    const auto pins = own->second.find(set.sha256);
+    const auto pins = own->second.find(set.set);
     if (--pins->second.frames == 0) {
       own->second.erase(pins);
     }
@@ -52,7 +53,7 @@ class PinnedSets {
     uint64_t bytes = 0;
     size_t frames = 0;
   };
-  std::map<std::string, std::map<std::string, Pins>> of_;  // no client or set without frames
+  std::map<std::string, std::map<const ParticleSet*, Pins>> of_;  // no client or set without frames
 };
 
 }  // namespace halflight

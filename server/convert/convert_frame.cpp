@@ -45,12 +45,11 @@ std::string FingerprintOf(const v1::RenderFrameRequest& request, const NamedPart
 
 uint64_t HeldBytes(const FrameJob& job, uint64_t output_bytes) {
   uint64_t bytes = output_bytes;
-  const OutputJob beauty{.shown = {ImageKind::kBeauty}};
   const bool shown =
       std::any_of(job.outputs.begin(), job.outputs.end(),
-                  [&](const OutputJob& output) { return output.shown.kind == beauty.shown.kind; });
+                  [](const OutputJob& output) { return output.shown.kind == ImageKind::kBeauty; });
   if (job.measure.has_value() && (job.measure->without_scattering || !shown)) {
-    bytes += PixelBytes({beauty}, job.request.scene);
+    bytes += PixelBytes({{.shown = {ImageKind::kBeauty}}}, job.request.scene);
   }
   return job.target.has_value() ? 2 * bytes : bytes;
 }

@@ -4,6 +4,7 @@
 
 #include <atomic>
 #include <future>
+#include <map>
 #include <mutex>
 #include <thread>
 #include <vector>
@@ -205,9 +206,13 @@ TEST_F(Pipeline, ClientsFramesPinSoMuchOfTheirSetsAndLeaveRoomForOthers) {
   ASSERT_GT(bytes, 0U);
   Start({.admission = {.max_client_set_bytes = 2 * bytes}, .encode = EncodePlain});
   engine_.SetGate(false);
+  std::map<std::string, std::shared_ptr<const ParticleSet>> sets;
+  for (const char* name : {"a", "b", "c", "d"}) {
+    sets[name] = std::make_shared<ParticleSet>(*job.request.scene.particles);
+  }
   const auto frame_of = [&](const std::string& tenant, const std::string& set) {
     job.caller.tenant = tenant;
-    job.particle_sha256 = set;
+    job.request.scene.particles = sets.at(set);
     return Submit(job);
   };
   std::vector<std::future<Result>> let_in;

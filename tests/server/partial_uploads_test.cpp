@@ -156,6 +156,20 @@ TEST_F(Partial, ClientWithTooMuchTakesNobodyElsesRoom) {
   EXPECT_EQ(memory.left(), 0U);
 }
 
+TEST_F(Partial, WhatIsTakenOverCountsAsItsNewOwners) {
+  ByteBudget memory(10000, 4000);
+  ByteBudget::Share share(memory, "first");
+  ASSERT_EQ(share.Grow(3000), Growth::kDone);
+  share.PassTo("second");
+  ByteBudget::Share firsts(memory, "first");
+  ByteBudget::Share others(memory, "second");
+  EXPECT_EQ(firsts.Grow(4000), Growth::kDone);
+  EXPECT_EQ(others.Grow(1001), Growth::kClientFull);
+  share.PassTo("first");
+  EXPECT_EQ(share.client(), "second") << "there is no room";
+  EXPECT_EQ(memory.used(), 7000U);
+}
+
 TEST_F(Partial, NothingIsKeptOfNothingOrWhereNothingIsToBeKept) {
   uploads_.Keep(Begun(100, 0));
   EXPECT_EQ(uploads_.CommittedBytes(NameOf(100)), 0U);
