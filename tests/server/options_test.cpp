@@ -72,6 +72,19 @@ TEST(Options, CacheDirectoryHasABoundAndWithoutOneThereIsNone) {
   EXPECT_EQ((*options)->limits.max_partial_uploads, 5U);
 }
 
+TEST(Options, SharesOfAClientAreThreeQuartersAndEnoughForOneUnlessToldOtherwise) {
+  const ServerLimits usual = (*Parse({}))->limits;
+  EXPECT_EQ(usual.max_client_frame_bytes, 3 * kGiB);
+  EXPECT_EQ(usual.max_client_set_bytes, 3 * kGiB);
+  EXPECT_EQ(usual.max_client_upload_bytes, 3 * kGiB);
+  const ServerLimits small = (*Parse({"--max-frame-bytes", "2GiB", "--max-cache-bytes", "1100MiB",
+                                      "--max-client-set-bytes", "1050MiB"}))
+                                 ->limits;
+  EXPECT_EQ(small.max_client_frame_bytes, 1536 * kMiB);
+  EXPECT_EQ(small.max_client_set_bytes, 1050 * kMiB);
+  EXPECT_EQ(small.max_client_upload_bytes, 1 * kGiB) << "a set of --max-particle-bytes";
+}
+
 // What a server started with these limits tells of them.
 v1::ServerLimits Told(const ServerLimits& limits) {
   testing::FakeEngine engine;
