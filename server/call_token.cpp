@@ -145,7 +145,9 @@ void CallToken::OnSent(size_t bytes) {
 }
 
 void CallToken::EndForStall(std::chrono::seconds waited) {
-  stalled_ = true;
+  if (stalled_.exchange(true)) {
+    return;  // in another of its steps
+  }
   ++count_.stalled;
   Log(LogLevel::kWarn, "call_stalled",
       {{"rpc", NameOf(rpc_)},
