@@ -17,29 +17,47 @@ std::string ByteBudget::Allowed(Growth growth, std::string_view users) const {
 
 ByteBudget::Growth ByteBudget::Take(const std::string& client, uint64_t bytes) {
   const std::lock_guard lock(mutex_);
-  const auto own = used_by_.find(client);
-  if (bytes > each_ - (own == used_by_.end() ? 0 : own->second)) {
+  if (!Fits(client, bytes)) {
     return Growth::kClientFull;
   }
   if (bytes > total_ - used_) {
     return Growth::kFull;
   }
-  if (bytes > 0) {
-    used_ += bytes;
-    used_by_[client] += bytes;
-  }
+  used_ += bytes;
+  Charge(client, bytes);
   return Growth::kDone;
 }
 
 void ByteBudget::GiveBack(const std::string& client, uint64_t bytes) {
-  if (bytes == 0) {
-    return;
-  }
   const std::lock_guard lock(mutex_);
   used_ -= bytes;
+  Discharge(client, bytes);
+}
+
+bool ByteBudget::Move(const std::string& from, const std::string& to, uint64_t bytes) {
+  const std::lock_guard lock(mutex_);
+  if (from == to || !Fits(to, bytes)) {
+    return false;
+  }
+  Discharge(from, bytes);
+  Charge(to, bytes);
+  return true;
+}
+
+bool ByteBudget::Fits(const std::string& client, uint64_t bytes) const {
   const auto own = used_by_.find(client);
-  own->second -= bytes;
-  if (own->second == 0) {
+  return bytes <= each_ - (own == used_by_.end() ? 0 : own->second);
+}
+
+void ByteBudget::Charge(const std::string& client, uint64_t bytes) {
+  if (bytes > 0) {
+    used_by_[client] += bytes;
+  }
+}
+
+void ByteBudget::Discharge(const std::string& client, uint64_t bytes) {
+  const auto own = used_by_.find(client);
+  if (own != used_by_.end() && (own->second -= bytes) == 0) {
     used_by_.erase(own);
   }
 }

@@ -47,11 +47,9 @@ class ByteBudget {
       return growth;
     }
 
-    // From now on it is this client's; unless there is no room for it once more, when nothing
-    // changes.
+    // From now on it is this client's; unless that one has too much, when nothing changes.
     void PassTo(const std::string& client) {
-      if (client != client_ && budget_.Take(client, taken_) == Growth::kDone) {
-        budget_.GiveBack(client_, taken_);
+      if (budget_.Move(client_, client, taken_)) {
         client_ = client;
       }
     }
@@ -80,6 +78,11 @@ class ByteBudget {
  private:
   Growth Take(const std::string& client, uint64_t bytes);
   void GiveBack(const std::string& client, uint64_t bytes);
+  bool Move(const std::string& from, const std::string& to, uint64_t bytes);
+  // Under the mutex. The first: whether there is room for them.
+  [[nodiscard]] bool Fits(const std::string& client, uint64_t bytes) const;
+  void Charge(const std::string& client, uint64_t bytes);
+  void Discharge(const std::string& client, uint64_t bytes);
 
   const uint64_t total_;
   const uint64_t each_;

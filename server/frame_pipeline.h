@@ -79,7 +79,7 @@ class FramePipeline {
   // long, Unavailable where the device failed under it, FailedPrecondition where it did so before.
   // Frames may be done in another order than they were submitted. Otherwise `done` is never called:
   // ResourceExhausted with reason and retry hint when too many frames are under way, or of this
-  // client, or when they hold too much memory. Any thread.
+  // client, or when they hold too much memory, of their own or of particle sets. Any thread.
   absl::Status Submit(FrameJob job, std::stop_token stop, Done done);
 
   // Whether Submit would find a place for a frame of this client now, its memory left aside: for

@@ -39,7 +39,7 @@ void AddLimitFlags(CLI::App& app, Options& options) {
   bytes(
       "--max-cache-bytes", limits.max_cache_bytes,
       "Bytes of all particle sets kept in memory, and as many again of all uploads in progress or "
-      "broken off");
+      "broken off, with particles that open sequences were sent inline");
   bytes("--max-client-set-bytes", limits.max_client_set_bytes,
         "Of these, those of sets that one client's frames need; three quarters if unset");
   bytes("--max-client-upload-bytes", limits.max_client_upload_bytes,

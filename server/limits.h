@@ -15,7 +15,8 @@ inline constexpr uint64_t kGiB = uint64_t{1} << 30U;
 struct ServerLimits {
   uint64_t max_particles = 50'000'000;
   uint64_t max_particle_bytes = 1 * kGiB;
-  uint64_t max_cache_bytes = 4 * kGiB;  // also bounds what all uploads in progress hold together
+  uint64_t max_cache_bytes =
+      4 * kGiB;  // also bounds what uploads and inline sets of sequences hold
   uint64_t max_client_set_bytes = 3 * kGiB;  // of sets that frames of one client need
   uint64_t max_client_upload_bytes = 3 * kGiB;
   uint32_t max_image_size = 8192;

@@ -46,6 +46,9 @@ class ParticleStore {
   // The set, which counts as used now; null where it is not in memory.
   std::shared_ptr<const ParticleSet> Find(const std::string& sha256);
 
+  // The same again for a frame that has found it before: not counted as another lookup.
+  std::shared_ptr<const ParticleSet> Use(const std::string& sha256);
+
   // Whether the set is held, in memory or on disk. It counts as used: what a client asks about it
   // is about to use.
   bool Touch(const std::string& sha256);
@@ -93,8 +96,6 @@ class ParticleStore {
   using Entries = std::list<Entry>;
 
   bool InMemory(const std::string& sha256) const;
-  // Find without counting.
-  std::shared_ptr<const ParticleSet> Use(const std::string& sha256);
   absl::Status Keep(const std::string& sha256, std::shared_ptr<const ParticleSet> set);
   // Under the mutex: whom to drop for a set of so many bytes; none where that does not do.
   [[nodiscard]] std::optional<std::vector<Entries::const_iterator>> ToDropFor(uint64_t bytes) const;

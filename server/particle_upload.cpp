@@ -168,8 +168,7 @@ absl::Status ParticleUpload::AtEndOfStream() {
   }
   Keep();
   over_ = true;
-  return FieldError("part", "the stream ended (or a message could not be read) before finish",
-                    "header, chunks, finish");
+  return FieldError("part", "the stream ended before finish", "header, chunks, finish");
 }
 
 absl::StatusOr<NamedParticles> BuildInlineParticles(const v1::InlineParticles& particles,

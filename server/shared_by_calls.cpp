@@ -7,7 +7,8 @@ namespace halflight {
 std::function<void()> SharedByCalls::StallEnder(CallToken& token) {
   return [this, &token] {
     token.EndForStall(std::chrono::duration_cast<std::chrono::seconds>(stall_limit()));
-    if (!looking_.exchange(true)) {
+    if (!looking_at_connections) {
+      looking_at_connections = true;
       LookAtConnections();
     }
   };
@@ -17,11 +18,11 @@ std::function<void()> SharedByCalls::StallEnder(CallToken& token) {
 void SharedByCalls::LookAtConnections() {
   using std::chrono::milliseconds;
   if (count.stalled == 0) {
-    looking_ = false;
+    looking_at_connections = false;
     return;
   }
   const auto apart = std::clamp(stall_limit() / 20, milliseconds(1), milliseconds(1000));
-  connections_.CutOffStalled(stall_limit(), apart);
+  connections.CutOffStalled(stall_limit(), apart);
   timer.At(Timer::Clock::now() + apart, [this] { LookAtConnections(); });
 }
 

@@ -1,7 +1,6 @@
 // What all calls of a service share, and what becomes of those whose peers keep them waiting.
 #pragma once
 
-#include <atomic>
 #include <chrono>
 #include <functional>
 
@@ -13,10 +12,9 @@
 
 namespace halflight {
 
-class SharedByCalls {
- public:
-  SharedByCalls(const Backend& the_backend, const Access& the_access, Connections& connections)
-      : backend(the_backend), access(the_access), connections_(connections) {}
+struct SharedByCalls {
+  SharedByCalls(const Backend& the_backend, const Access& the_access, Connections& the_connections)
+      : backend(the_backend), access(the_access), connections(the_connections) {}
 
   [[nodiscard]] std::chrono::milliseconds stall_limit() const {
     return std::chrono::seconds(backend.limits.max_stall_seconds);
@@ -27,15 +25,14 @@ class SharedByCalls {
 
   const Backend backend;
   const Access& access;
+  Connections& connections;
   CallCount count;
-  Timer timer;
+  bool looking_at_connections = false;  // on the timer's thread
+  Timer timer;                          // after what its thread uses
   OpenSequences sequences;
 
  private:
   void LookAtConnections();
-
-  Connections& connections_;
-  std::atomic<bool> looking_ = false;
 };
 
 }  // namespace halflight

@@ -43,7 +43,7 @@ class UploadCall final : public grpc::ServerReadReactor<grpc::ByteBuffer> {
     token_.OnReceived(request_.Length());
     const auto request = TakeMessage<v1::UploadParticlesRequest>(request_);
     if (!request.ok()) {
-      Answer(request.status());
+      Answer(handler_.OnUnreadableRequest(request.status()));
     } else if (const auto answer = handler_.OnRequest(*request)) {
       Answer(*answer);
     } else {

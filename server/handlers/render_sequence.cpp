@@ -78,6 +78,16 @@ void RenderSequenceHandler::Submit() {
   std::unique_lock lock(mutex_);
   const std::shared_ptr<Slot> slot = slots_.back();
   FrameJob job = *waiting_;
+  // Others may have pushed it out of memory meanwhile.
+  const std::string& sha256 = state_.SetWanted({});
+  if (backend_.store.OnDiskOnly(sha256)) {
+    fetching_ = true;
+    lock.unlock();
+    backend_.store.Fetch(
+        sha256, stop_.get_token(),
+        [self = shared_from_this()](const absl::Status& fetched) { self->OnFetched(fetched); });
+    return;
+  }
   lock.unlock();
   const auto particles = state_.Particles();
   absl::Status status = particles.status();
@@ -97,6 +107,20 @@ void RenderSequenceHandler::Submit() {
     Refuse(*slot, waiting_->request_id, status);
   }
   waiting_.reset();
+}
+
+// The set of the frame that waits is in memory or nowhere, or there is no room for it.
+void RenderSequenceHandler::OnFetched(const absl::Status& fetched) {
+  {
+    const std::lock_guard lock(mutex_);
+    fetching_ = false;
+    may_submit_ = true;
+    if (!fetched.ok() && !end_.has_value()) {
+      Refuse(*slots_.back(), waiting_->request_id, fetched);
+      waiting_.reset();
+    }
+  }
+  Advance();
 }
 
 void RenderSequenceHandler::OnEndOfRequests() {
@@ -205,6 +229,7 @@ RenderSequenceHandler::Step RenderSequenceHandler::NextStep() {
       }
       backend_.metrics.OnFrameSent(messages_->age());
       messages_.reset();
+      slots_.front()->result.reset();  // whoever else has the slot shall hold no frame
       slots_.pop_front();
       may_submit_ = true;
       return NextStep();
@@ -224,7 +249,7 @@ RenderSequenceHandler::Step RenderSequenceHandler::NextStep() {
     return Step::kFinish;
   }
   if (waiting_.has_value()) {
-    return std::exchange(may_submit_, false) ? Step::kSubmit : Step::kNothing;
+    return !fetching_ && std::exchange(may_submit_, false) ? Step::kSubmit : Step::kNothing;
   }
   if (!reading_ && !requests_ended_ && !draining_ && slots_.size() < kFramesAhead) {
     reading_ = true;

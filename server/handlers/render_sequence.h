@@ -74,6 +74,7 @@ class RenderSequenceHandler : public std::enable_shared_from_this<RenderSequence
   [[nodiscard]] std::string FrameName(const std::string& request_id, uint64_t index) const;
   void Refuse(Slot& slot, const std::string& request_id, const absl::Status& status);
   void Submit();
+  void OnFetched(const absl::Status& fetched);
   void OnFrame(Slot& slot, FrameOrError result);
   void End(const absl::Status& status);
   void Advance();
@@ -93,6 +94,7 @@ class RenderSequenceHandler : public std::enable_shared_from_this<RenderSequence
   std::deque<std::shared_ptr<Slot>> slots_;  // in order; the first is being sent or waited for
   std::optional<FrameJob> waiting_;          // of the last slot, to be submitted
   bool may_submit_ = false;                  // there may be room for it in the queue
+  bool fetching_ = false;                    // its set is being read from disk
   std::optional<FrameMessages> messages_;    // of the first slot
   OutgoingMessage<v1::RenderSequenceResponse> outgoing_;
   std::optional<absl::Status> end_;  // what the call ends with

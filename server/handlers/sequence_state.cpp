@@ -37,7 +37,8 @@ absl::StatusOr<FrameJob> SequenceState::Next(const v1::RenderFrameRequest& reque
     inline_.reset();
     inline_memory_.Release();
   }
-  const auto particles = Particles();
+  const auto particles =
+      inline_.has_value() ? *inline_ : ResolveParticles(merged, backend_.store, backend_.limits);
   if (!particles.ok()) {
     return particles.status();
   }
@@ -89,7 +90,11 @@ absl::StatusOr<NamedParticles> SequenceState::Particles() {
   if (inline_.has_value()) {
     return *inline_;
   }
-  return ResolveParticles(merged_.scene(), backend_.store, backend_.limits);
+  const std::string& sha256 = merged_.scene().particle_sha256();
+  if (auto set = backend_.store.Use(sha256)) {
+    return NamedParticles{sha256, std::move(set)};
+  }
+  return ResolveParticles(merged_.scene(), backend_.store, backend_.limits);  // says why not
 }
 
 const std::string& SequenceState::SetWanted(const v1::Scene& scene) const {

@@ -26,6 +26,11 @@ std::optional<UploadParticlesHandler::Answer> UploadParticlesHandler::OnRequest(
   return std::nullopt;
 }
 
+UploadParticlesHandler::Answer UploadParticlesHandler::OnUnreadableRequest(absl::Status why) {
+  upload_.AtEndOfStream().IgnoreError();
+  return End(UploadEnd::kRefused, std::move(why));
+}
+
 UploadParticlesHandler::Answer UploadParticlesHandler::OnEndOfRequests() {
   if (absl::Status status = upload_.AtEndOfStream(); !status.ok()) {
     return End(UploadEnd::kBrokenOff, std::move(status));

@@ -23,6 +23,9 @@ class UploadParticlesHandler {
   // The next message: none to go on reading, or the answer that ends the call.
   std::optional<Answer> OnRequest(const v1::UploadParticlesRequest& request);
 
+  // Instead, where what came cannot be taken for this reason: the answer. What came before is kept.
+  Answer OnUnreadableRequest(absl::Status why);
+
   Answer OnEndOfRequests();
 
  private:

@@ -48,7 +48,8 @@ void AddParticles(Families& to, const ParticleStore& store, const PartialUploads
   to.push_back(CounterOf("halflight_disk_cache_reads_total", "Particle sets read from there",
                          {Labelled("result", "ok", state.disk_reads),
                           Labelled("result", "failed", state.failed_disk_reads)}));
-  AddGauge(to, "halflight_upload_memory_bytes", "Uploads under way or broken off",
+  AddGauge(to, "halflight_upload_memory_bytes",
+           "Uploads under way or broken off, and inline particles of sequences",
            uploads.memory().used());
   AddGauge(to, "halflight_partial_uploads", "Uploads that broke off and can be resumed",
            uploads.count());

@@ -168,6 +168,16 @@ TEST_F(Handlers, FrameCancelledWhileItsParticlesAreReadIsNotRendered) {
   EXPECT_EQ(engine_.rendered(), 0);
 }
 
+TEST_F(Handlers, UploadThatCannotBeReadAnyMoreKeepsWhatCameBefore) {
+  const v1::InlineParticles particles = MakeParticles(10, {v1::PARTICLE_ATTRIBUTE_POSITION});
+  UploadParticlesHandler upload(backend_);
+  ASSERT_FALSE(upload.OnRequest(testing::Header(testing::Describe(particles))).has_value());
+  ASSERT_FALSE(upload.OnRequest(testing::Chunk(particles.payload().substr(0, 50))).has_value());
+  EXPECT_EQ(upload.OnUnreadableRequest(absl::InvalidArgumentError("why")).status(),
+            absl::InvalidArgumentError("why"));
+  EXPECT_EQ(partial_uploads_.CommittedBytes(testing::Describe(particles).sha256()), 50U);
+}
+
 TEST_F(Handlers, QueryTellsHowMuchOfAnUploadIsThere) {
   const v1::InlineParticles particles = MakeParticles(10, {v1::PARTICLE_ATTRIBUTE_POSITION});
   const v1::ParticleSetDescription header = testing::Describe(particles);
@@ -456,6 +466,35 @@ TEST_F(Sequence, FrameThatWaitsForAPlaceKeepsNoSetFromGoing) {
     handler->OnWritten(true);
   }
   EXPECT_EQ(engine_.last_request().scene.particles, brought->set);
+  handler->OnEndOfRequests();
+}
+
+TEST_F(Sequence, SetOfAFrameThatWaitsIsReadFromDiskWhereOthersPushedItOut) {
+  const OnDisk disk(limits_);
+  FramePipeline full(
+      engine_, {.admission = {.max_queued_frames = 1}, .encode_threads = 1, .encode = EncodePlain});
+  const Backend backend{engine_.device(), limits_, version_, *disk.store, partial_uploads_, full};
+  engine_.SetGate(false);
+  FakeSink<v1::RenderSequenceResponse> sink;
+  const auto handler = std::make_shared<RenderSequenceHandler>(backend, sink);
+  handler->Start();
+  handler->OnRequest(Wrap(MakeRequest()));
+  ASSERT_TRUE(WaitFor([&] { return full.queued() == 1 && sink.reads() == 2; }));
+  handler->OnRequest(Wrap(disk.Request()));
+  ASSERT_TRUE(WaitFor([&] { return disk.store->state().disk_reads == 1; }));
+  auto others = std::make_shared<ParticleSet>();
+  others->positions.resize((1 << 20) / 12);
+  ASSERT_TRUE(WaitFor([&] { return disk.store->Insert("others", others).ok(); }));
+  others.reset();
+  ASSERT_TRUE(WaitFor([&] { return disk.store->idle(); }));
+  ASSERT_TRUE(disk.store->OnDiskOnly(disk.sha256));
+  engine_.SetGate(true);
+  for (int frames = 0; frames < 2;) {
+    ASSERT_TRUE(sink.WaitForWrite()) << *sink.finished();
+    frames += sink.written().back().has_trailer() ? 1 : 0;
+    handler->OnWritten(true);
+  }
+  EXPECT_EQ(disk.store->state().disk_reads, 2U);
   handler->OnEndOfRequests();
 }
 

@@ -157,7 +157,7 @@ TEST_F(Partial, ClientWithTooMuchTakesNobodyElsesRoom) {
 }
 
 TEST_F(Partial, WhatIsTakenOverCountsAsItsNewOwners) {
-  ByteBudget memory(10000, 4000);
+  ByteBudget memory(7000, 4000);
   ByteBudget::Share share(memory, "first");
   ASSERT_EQ(share.Grow(3000), Growth::kDone);
   share.PassTo("second");
