@@ -443,6 +443,7 @@ TEST_F(Sequence, PriorityIsThatOfTheRequestItself) {
 }
 
 TEST_F(Sequence, FrameThatWaitsForAPlaceKeepsNoSetFromGoing) {
+  FakeSink<v1::RenderSequenceResponse> sink;  // until nobody advances any more
   FramePipeline full(
       engine_, {.admission = {.max_queued_frames = 1}, .encode_threads = 1, .encode = EncodePlain});
   const Backend backend{engine_.device(), limits_, version_, store_, partial_uploads_, full};
@@ -452,7 +453,6 @@ TEST_F(Sequence, FrameThatWaitsForAPlaceKeepsNoSetFromGoing) {
   v1::RenderSequenceRequest named;
   *named.mutable_frame() = MakeRequest();
   named.mutable_frame()->mutable_scene()->set_particle_sha256(brought->sha256);
-  FakeSink<v1::RenderSequenceResponse> sink;
   const auto handler = std::make_shared<RenderSequenceHandler>(backend, sink);
   handler->Start();
   handler->OnRequest(Wrap(MakeRequest()));
@@ -467,15 +467,16 @@ TEST_F(Sequence, FrameThatWaitsForAPlaceKeepsNoSetFromGoing) {
   }
   EXPECT_EQ(engine_.last_request().scene.particles, brought->set);
   handler->OnEndOfRequests();
+  EXPECT_TRUE(sink.WaitForFinish().ok());
 }
 
 TEST_F(Sequence, SetOfAFrameThatWaitsIsReadFromDiskWhereOthersPushedItOut) {
+  FakeSink<v1::RenderSequenceResponse> sink;  // until nobody advances any more
   const OnDisk disk(limits_);
   FramePipeline full(
       engine_, {.admission = {.max_queued_frames = 1}, .encode_threads = 1, .encode = EncodePlain});
   const Backend backend{engine_.device(), limits_, version_, *disk.store, partial_uploads_, full};
   engine_.SetGate(false);
-  FakeSink<v1::RenderSequenceResponse> sink;
   const auto handler = std::make_shared<RenderSequenceHandler>(backend, sink);
   handler->Start();
   handler->OnRequest(Wrap(MakeRequest()));
@@ -496,6 +497,7 @@ TEST_F(Sequence, SetOfAFrameThatWaitsIsReadFromDiskWhereOthersPushedItOut) {
   }
   EXPECT_EQ(disk.store->state().disk_reads, 2U);
   handler->OnEndOfRequests();
+  EXPECT_TRUE(sink.WaitForFinish().ok());
 }
 
 TEST_F(Sequence, ParticlesThatItCarriesCountUntilOthersTakeTheirPlace) {
