@@ -84,6 +84,7 @@ absl::Status ParticleUpload::Begin(const v1::ParticleSetDescription& header) {
   }
   upload_ = *std::move(kept);
   upload_->memory.PassTo(caller_.client());
+  resumed_ = true;
   at_ = header.resume_offset();
   return absl::OkStatus();
 }
@@ -119,7 +120,13 @@ absl::Status ParticleUpload::Append(std::string_view bytes) {
                        partial_.memory().Allowed(growth, "uploads in progress"));
     }
   }
-  return assembler.Append(bytes);
+  absl::Status taken = assembler.Append(bytes);
+  if (resumed_ && absl::IsInvalidArgument(taken)) {
+    // A value may be half of what another has sent: who sends all again learns whose it was.
+    return WithReason(WithCode(absl::StatusCode::kDataLoss, taken),
+                      v1::ERROR_REASON_CHECKSUM_MISMATCH);
+  }
+  return taken;
 }
 
 absl::Status ParticleUpload::Finish(const v1::UploadFinish& finish) {

@@ -63,6 +63,7 @@ class ParticleUpload {
   const Caller caller_;
   std::unique_ptr<PartialUpload> upload_;  // from the header until the upload is over
   uint64_t at_ = 0;                        // where in the payload the next chunk begins
+  bool resumed_ = false;                   // on what somebody has sent before
   bool over_ = false;
   std::optional<v1::UploadParticlesResponse> response_;
 };

@@ -181,6 +181,22 @@ TEST_F(Upload, CountOverTheLimitsIsRefusedBeforeAnyBody) {
   EXPECT_EQ(Send({Header(header_)}).code(), absl::StatusCode::kInvalidArgument);
 }
 
+TEST_F(Upload, ValueThatIsHalfAnothersIsNobodysFaultYet) {
+  const std::string& bytes = particles_.payload();
+  {
+    ParticleUpload rubbish(store_, partial_, limits_);
+    ASSERT_TRUE(rubbish.Receive(Header(header_)).ok());
+    ASSERT_TRUE(rubbish.Receive(Chunk(std::string(4, '\xff'))).ok());
+  }
+  ASSERT_EQ(partial_.CommittedBytes(header_.sha256()), 4U);
+  ParticleUpload resumed(store_, partial_, limits_);
+  ASSERT_TRUE(resumed.Receive(Header(header_, 4)).ok());
+  const absl::Status status = resumed.Receive(Chunk(bytes.substr(4)));
+  EXPECT_EQ(status.code(), absl::StatusCode::kDataLoss) << status;
+  EXPECT_EQ(DetailOf(status).reason, v1::ERROR_REASON_CHECKSUM_MISMATCH);
+  EXPECT_TRUE(Send({Header(header_), Chunk(bytes), Finish(header_)}).ok());
+}
+
 TEST_F(Upload, OneClientsUploadsLeaveRoomForOthers) {
   ByteBudget small(4000, 3000);
   PartialUploads partial(small, {});
