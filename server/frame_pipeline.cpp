@@ -376,11 +376,13 @@ void FramePipeline::Complete(const FlightPtr& flight) {
     answer = flight->outcome;
   }
   // Pixels go before the answer does: a slow reader shall hold the encoded bytes only, which are
-  // the pixels where raw floats were asked for.
+  // the pixels where raw floats were asked for. So does the set, for which the next frame of a
+  // sequence may wait.
   flight->frame = {};
   flight->images.clear();
   flight->memory.reset();
   admission_.OnEncoded(flight->job.caller.client(), SetOf(flight->job));
+  flight->job.request.scene.particles.reset();
   std::exchange(flight->done, nullptr)(std::move(answer));
   admission_.OnEnded();
 }

@@ -60,12 +60,16 @@ std::string BytesBeforeData(std::string rest, int chunk_field, const v1::OutputC
 // Two slices, of which the second is the data and keeps it alive.
 grpc::ByteBuffer JoinWithoutCopying(const std::string& before, const SharedBytes& data);
 
+inline grpc::ByteBuffer ToByteBuffer(const google::protobuf::Message& message) {
+  return JoinWithoutCopying(message.SerializeAsString(), {});
+}
+
 // RenderFrameResponse and RenderSequenceResponse, whose chunks have their highest set field number.
 template <typename Response>
 grpc::ByteBuffer ToByteBuffer(const OutgoingMessage<Response>& outgoing) {
   const Response& message = outgoing.message;
   if (!message.has_chunk()) {
-    return JoinWithoutCopying(message.SerializeAsString(), {});
+    return ToByteBuffer(message);
   }
   Response rest = message;
   rest.clear_chunk();

@@ -61,7 +61,7 @@ class UploadCall final : public grpc::ServerReadReactor<grpc::ByteBuffer> {
 
   void Answer(const UploadParticlesHandler::Answer& answer) {
     if (answer.ok()) {
-      response_ = JoinWithoutCopying(answer->SerializeAsString(), {});
+      response_ = ToByteBuffer(*answer);
     }
     const grpc::Status status = token_.End(answer.status());
     stall_.Begin();  // of a peer that reads nothing: until OnDone the call counts

@@ -47,7 +47,7 @@ class UnaryCall final : public grpc::ServerUnaryReactor {
     }
     const auto answer = handler(*request, token_.caller());
     if (answer.ok()) {
-      response = JoinWithoutCopying(answer->SerializeAsString(), {});
+      response = ToByteBuffer(*answer);
       token_.OnSent(response.Length());
     }
     return answer.status();

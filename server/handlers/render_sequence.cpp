@@ -13,73 +13,54 @@
 namespace halflight {
 
 void RenderSequenceHandler::OnRequest(const v1::RenderSequenceRequest& request) {
-  const std::string& sha256 = state_.SetWanted(request.frame().scene());
-  if (backend_.store.OnDiskOnly(sha256)) {
-    // Until then the read counts as not done, so that no other begins.
-    backend_.store.Fetch(sha256, stop_.get_token(),
-                         [self = shared_from_this(), request](const absl::Status& fetched) {
-                           self->Accept(request, fetched);
-                         });
-  } else {
-    Accept(request, absl::OkStatus());
-  }
-}
-
-void RenderSequenceHandler::Accept(const v1::RenderSequenceRequest& request,
-                                   const absl::Status& fetched) {
-  if (stop_.stop_requested()) {
-    return;  // whoever did has ended the call
-  }
-  Take(fetched.ok() ? state_.Next(request.frame()) : fetched, request.frame().request_id());
-}
-
-void RenderSequenceHandler::OnUnreadableRequest(const absl::Status& why) { Take(why, ""); }
-
-void RenderSequenceHandler::Take(absl::StatusOr<FrameJob> job, const std::string& request_id) {
   {
     const std::lock_guard lock(mutex_);
-    reading_ = false;
-    slots_.push_back(std::make_shared<Slot>());
-    slots_.back()->index = next_index_++;
+    AddSlot(request.frame().request_id());
     if (draining_) {
-      job = DrainingError();
-    }
-    if (job.ok()) {
-      waiting_ = *std::move(job);
-      waiting_->request.scene.particles.reset();  // a frame that waits keeps no set from going
-      waiting_->caller = caller_;
-      waiting_->request_id = FrameName(request_id, slots_.back()->index);
-      may_submit_ = true;
+      Refuse(DrainingError());
     } else {
-      Refuse(*slots_.back(), FrameName(request_id, slots_.back()->index), job.status());
+      waiting_.emplace().request = request.frame();
+      may_submit_ = true;
     }
   }
   Advance();
 }
 
-// Frames that have no names of their own are numbered.
-std::string RenderSequenceHandler::FrameName(const std::string& request_id, uint64_t index) const {
-  return request_id.empty() && !caller_.call_id.empty()
-             ? fmt::format("{}.{}", caller_.call_id, index)
-             : request_id;
+void RenderSequenceHandler::OnUnreadableRequest(const absl::Status& why) {
+  {
+    const std::lock_guard lock(mutex_);
+    AddSlot("");
+    Refuse(why);
+  }
+  Advance();
 }
 
-// Under the mutex. The stream ends with this frame.
-void RenderSequenceHandler::Refuse(Slot& slot, const std::string& request_id,
-                                   const absl::Status& status) {
-  Log(LogLevel::kInfo, "frame", RefusedFrameFields(request_id, caller_, status));
+// Under the mutex: for what has been read. Frames that have no names of their own are numbered.
+void RenderSequenceHandler::AddSlot(const std::string& request_id) {
+  reading_ = false;
+  Slot& slot = *slots_.emplace_back(std::make_shared<Slot>());
+  slot.index = next_index_++;
+  slot.name = request_id.empty() && !caller_.call_id.empty()
+                  ? fmt::format("{}.{}", caller_.call_id, slot.index)
+                  : request_id;
+}
+
+// Under the mutex: the last frame. The stream ends with it.
+void RenderSequenceHandler::Refuse(const absl::Status& status) {
+  Slot& slot = *slots_.back();
+  Log(LogLevel::kInfo, "frame", RefusedFrameFields(slot.name, caller_, status));
   backend_.metrics.OnFrameRefused(caller_.tenant, status.code());
   slot.result = status;
+  waiting_.reset();
   requests_ended_ = true;
 }
 
-// By the thread that advances: hands the frame that waits to the pipeline.
+// By the thread that advances, and nobody else touches the frame that waits meanwhile: hands it to
+// the pipeline, or has its set read from disk first, which others may have pushed out of memory
+// since the last time.
 void RenderSequenceHandler::Submit() {
+  const std::string sha256 = state_.SetWanted(waiting_->request.scene());
   std::unique_lock lock(mutex_);
-  const std::shared_ptr<Slot> slot = slots_.back();
-  FrameJob job = *waiting_;
-  // Others may have pushed it out of memory meanwhile.
-  const std::string& sha256 = state_.SetWanted({});
   if (backend_.store.OnDiskOnly(sha256)) {
     fetching_ = true;
     lock.unlock();
@@ -88,25 +69,40 @@ void RenderSequenceHandler::Submit() {
         [self = shared_from_this()](const absl::Status& fetched) { self->OnFetched(fetched); });
     return;
   }
+  const std::shared_ptr<Slot> slot = slots_.back();
   lock.unlock();
-  const auto particles = state_.Particles();
-  absl::Status status = particles.status();
-  if (particles.ok()) {
-    job.request.scene.particles = particles->set;
-    status = backend_.pipeline.Submit(std::move(job), stop_.get_token(),
-                                      [self = shared_from_this(), slot](FrameOrError frame) {
-                                        self->OnFrame(*slot, std::move(frame));
-                                      });
-  }
+  const absl::Status status = SubmitNow(slot);
   lock.lock();
-  // With frames of its own before it, or just sent, the stream tries again.
-  if (absl::IsResourceExhausted(status) && (slots_.size() > 1 || may_submit_)) {
-    return;
+  if (status.ok()) {
+    waiting_.reset();
+  } else if (waiting_->job.has_value()) {
+    WaitOrRefuse(status);
+  } else {
+    Refuse(status);  // of particles that it carries, too: they found no room, so they do not stay
   }
-  if (!status.ok()) {
-    Refuse(*slot, waiting_->request_id, status);
+}
+
+absl::Status RenderSequenceHandler::SubmitNow(const std::shared_ptr<Slot>& slot) {
+  if (!waiting_->job.has_value()) {
+    auto job = state_.Next(waiting_->request);
+    if (!job.ok()) {
+      return job.status();
+    }
+    job->caller = caller_;
+    job->request_id = slot->name;
+    job->request.scene.particles.reset();
+    waiting_ = Waiting{.request = {}, .job = *std::move(job)};
   }
-  waiting_.reset();
+  const auto particles = state_.Particles();
+  if (!particles.ok()) {
+    return particles.status();
+  }
+  FrameJob job = *waiting_->job;
+  job.request.scene.particles = particles->set;
+  return backend_.pipeline.Submit(std::move(job), stop_.get_token(),
+                                  [self = shared_from_this(), slot](FrameOrError frame) {
+                                    self->OnFrame(*slot, std::move(frame));
+                                  });
 }
 
 // The set of the frame that waits is in memory or nowhere, or there is no room for it.
@@ -114,13 +110,20 @@ void RenderSequenceHandler::OnFetched(const absl::Status& fetched) {
   {
     const std::lock_guard lock(mutex_);
     fetching_ = false;
-    may_submit_ = true;
-    if (!fetched.ok() && !end_.has_value()) {
-      Refuse(*slots_.back(), waiting_->request_id, fetched);
-      waiting_.reset();
+    if (fetched.ok()) {
+      may_submit_ = true;
+    } else if (!end_.has_value()) {
+      WaitOrRefuse(fetched);
     }
   }
   Advance();
+}
+
+// Under the mutex. With frames of its own before it, or just sent, the stream tries again.
+void RenderSequenceHandler::WaitOrRefuse(const absl::Status& status) {
+  if (!absl::IsResourceExhausted(status) || (slots_.size() == 1 && !may_submit_)) {
+    Refuse(status);
+  }
 }
 
 void RenderSequenceHandler::OnEndOfRequests() {

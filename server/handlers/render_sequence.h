@@ -32,8 +32,8 @@ inline constexpr size_t kFramesAhead = 4;
 // and calls Advance, which lets one thread at a time do what follows, without the mutex: so the
 // sink is never called by two at once, and never after Finish.
 //
-// A stream never fails because its own frames fill the queue, or the memory for frames: the next
-// one then waits until they are sent.
+// A stream never fails because its own frames fill the queue, the memory for frames or that for
+// particle sets: the next one then waits until they are sent.
 class RenderSequenceHandler : public std::enable_shared_from_this<RenderSequenceHandler> {
  public:
   RenderSequenceHandler(const Backend& backend, DuplexSink<v1::RenderSequenceResponse>& sink,
@@ -62,19 +62,25 @@ class RenderSequenceHandler : public std::enable_shared_from_this<RenderSequence
   using FrameOrError = absl::StatusOr<std::shared_ptr<const EncodedFrame>>;
 
   struct Slot {
-    uint64_t index;  // in the stream
+    uint64_t index;    // in the stream
+    std::string name;  // of the frame, in the log
     std::optional<FrameOrError> result;
+  };
+
+  // The frame of the last slot, until it is submitted.
+  struct Waiting {
+    v1::RenderFrameRequest request;  // empty once there is the job
+    std::optional<FrameJob> job;     // without particles: who waits keeps no set from going
   };
 
   enum class Step : uint8_t { kNothing, kSubmit, kRead, kWrite, kFinish };
 
-  // The particles are in memory or nowhere, or there is no room for them.
-  void Accept(const v1::RenderSequenceRequest& request, const absl::Status& fetched);
-  void Take(absl::StatusOr<FrameJob> job, const std::string& request_id);
-  [[nodiscard]] std::string FrameName(const std::string& request_id, uint64_t index) const;
-  void Refuse(Slot& slot, const std::string& request_id, const absl::Status& status);
+  void AddSlot(const std::string& request_id);
+  void Refuse(const absl::Status& status);
   void Submit();
+  absl::Status SubmitNow(const std::shared_ptr<Slot>& slot);
   void OnFetched(const absl::Status& fetched);
+  void WaitOrRefuse(const absl::Status& status);
   void OnFrame(Slot& slot, FrameOrError result);
   void End(const absl::Status& status);
   void Advance();
@@ -85,17 +91,15 @@ class RenderSequenceHandler : public std::enable_shared_from_this<RenderSequence
   const Caller caller_;
   std::stop_source stop_;
 
-  // Touched only by the thread that completes a read, reads being one at a time, and by that which
-  // submits a frame, before the next read.
-  SequenceState state_;
-  uint64_t next_index_ = 0;
+  SequenceState state_;  // touched only by the thread that submits a frame
 
   std::mutex mutex_;
+  uint64_t next_index_ = 0;
   std::deque<std::shared_ptr<Slot>> slots_;  // in order; the first is being sent or waited for
-  std::optional<FrameJob> waiting_;          // of the last slot, to be submitted
-  bool may_submit_ = false;                  // there may be room for it in the queue
-  bool fetching_ = false;                    // its set is being read from disk
-  std::optional<FrameMessages> messages_;    // of the first slot
+  std::optional<Waiting> waiting_;
+  bool may_submit_ = false;                // there may be room for it
+  bool fetching_ = false;                  // its set is being read from disk
+  std::optional<FrameMessages> messages_;  // of the first slot
   OutgoingMessage<v1::RenderSequenceResponse> outgoing_;
   std::optional<absl::Status> end_;  // what the call ends with
   bool reading_ = false;

@@ -9,8 +9,7 @@
 namespace halflight {
 
 absl::Status SequenceState::Hold(NamedParticles brought) {
-  inline_.reset();
-  inline_memory_.Release();
+  LetGo();
   const uint64_t bytes = MemoryBytes(*brought.set);
   const auto growth = backend_.partial_uploads.Grow(inline_memory_, bytes);
   if (growth != ByteBudget::Growth::kDone) {
@@ -20,6 +19,11 @@ absl::Status SequenceState::Hold(NamedParticles brought) {
   }
   inline_ = std::move(brought);
   return absl::OkStatus();
+}
+
+void SequenceState::LetGo() {
+  inline_.reset();
+  inline_memory_.Release();
 }
 
 absl::StatusOr<FrameJob> SequenceState::Next(const v1::RenderFrameRequest& request) {
@@ -34,8 +38,7 @@ absl::StatusOr<FrameJob> SequenceState::Next(const v1::RenderFrameRequest& reque
     merged.clear_particles();
   } else if (scene.has_particle_sha256()) {
     merged.set_particle_sha256(scene.particle_sha256());
-    inline_.reset();
-    inline_memory_.Release();
+    LetGo();
   }
   const auto particles =
       inline_.has_value() ? *inline_ : ResolveParticles(merged, backend_.store, backend_.limits);

@@ -37,7 +37,9 @@ class SequenceState {
   [[nodiscard]] const std::string& SetWanted(const v1::Scene& scene) const;
 
  private:
+  // Of particles that a request carries: instead of those before.
   absl::Status Hold(NamedParticles brought);
+  void LetGo();
 
   const Backend& backend_;
   v1::RenderFrameRequest merged_;         // of particles the name alone, where they are the store's

@@ -500,6 +500,40 @@ TEST_F(Sequence, SetOfAFrameThatWaitsIsReadFromDiskWhereOthersPushedItOut) {
   EXPECT_TRUE(sink.WaitForFinish().ok());
 }
 
+// As in a moving one whose sets are large.
+TEST_F(Sequence, FrameWhoseSetFindsNoRoomBesideThatOfTheFrameBeforeWaitsForIt) {
+  FakeSink<v1::RenderSequenceResponse> sink;  // until nobody advances any more
+  const testing::Folder folder;
+  std::vector<v1::RenderFrameRequest> requests;
+  for (const int particles : {50000, 50001}) {
+    const auto built =
+        BuildInlineParticles(MakeParticles(particles, {v1::PARTICLE_ATTRIBUTE_POSITION}), limits_);
+    (*ParticleFiles::Open(folder / "cache", limits_))->Write(built->sha256, built->set);
+    requests.push_back(MakeRequest());
+    requests.back().mutable_scene()->set_particle_sha256(built->sha256);
+    requests.back().mutable_scene()->mutable_material()->set_radius(0.1F);
+  }
+  ParticleStore store(1 << 20, *ParticleFiles::Open(folder / "cache", limits_));
+  const Backend backend{engine_.device(), limits_, version_, store, partial_uploads_, pipeline_};
+  engine_.SetGate(false);
+  const auto handler = std::make_shared<RenderSequenceHandler>(backend, sink);
+  handler->Start();
+  handler->OnRequest(Wrap(requests[0]));
+  ASSERT_TRUE(WaitFor([&] { return sink.reads() == 2; }));
+  handler->OnRequest(Wrap(requests[1]));
+  ASSERT_TRUE(WaitFor([&] { return store.state().disk_reads == 2; }));
+  // The engine of this test remembers its last request.
+  ASSERT_TRUE(engine_.Submit({}, {}, [](const auto&) {}).ok());
+  engine_.SetGate(true);
+  for (int frames = 0; frames < 2;) {
+    ASSERT_TRUE(sink.WaitForWrite()) << *sink.finished();
+    frames += sink.written().back().has_trailer() ? 1 : 0;
+    handler->OnWritten(true);
+  }
+  handler->OnEndOfRequests();
+  EXPECT_TRUE(sink.WaitForFinish().ok()) << *sink.finished();
+}
+
 TEST_F(Sequence, ParticlesThatItCarriesCountUntilOthersTakeTheirPlace) {
   v1::RenderFrameRequest request = MakeRequest();
   v1::InlineParticles& particles = *request.mutable_scene()->mutable_inline_particles();
