@@ -81,6 +81,10 @@ void AddLimitFlags(CLI::App& app, Options& options) {
   number("--max-stall-seconds", limits.max_stall_seconds,
          "How long a client may leave unread what is sent to it, or an upload unsent, before its "
          "call is ended; 0: for ever");
+  bytes(
+      "--min-bytes-per-second", limits.min_bytes_per_second,
+      "What a client must take of a frame, or send of an upload, in each second that it is waited "
+      "for beyond --max-stall-seconds; 0: any byte begins that time anew");
   number("--max-calls", limits.max_calls, "Calls under way");
   number(
       "--max-client-calls", limits.max_client_calls,

@@ -32,6 +32,7 @@ struct ServerLimits {
   uint64_t max_client_frame_bytes = 3 * kGiB;
   uint32_t max_frame_seconds = 600;
   uint32_t max_stall_seconds = 60;
+  uint64_t min_bytes_per_second = 16384;
   uint32_t max_calls = 4096;
   uint32_t max_client_calls = 3072;
   // Samples times particles: about a minute on two cores where particles overlap a few hundred

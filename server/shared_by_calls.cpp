@@ -6,7 +6,7 @@ namespace halflight {
 
 std::function<void()> SharedByCalls::StallEnder(CallToken& token) {
   return [this, &token] {
-    token.EndForStall(std::chrono::duration_cast<std::chrono::seconds>(stall_limit()));
+    token.EndForStall(std::chrono::seconds(backend.limits.max_stall_seconds));
     if (!looking_at_connections) {
       looking_at_connections = true;
       LookAtConnections();
@@ -21,8 +21,9 @@ void SharedByCalls::LookAtConnections() {
     looking_at_connections = false;
     return;
   }
-  const auto apart = std::clamp(stall_limit() / 20, milliseconds(1), milliseconds(1000));
-  connections.CutOffStalled(stall_limit(), apart);
+  const milliseconds limit = std::chrono::seconds(backend.limits.max_stall_seconds);
+  const auto apart = std::clamp(limit / 20, milliseconds(1), milliseconds(1000));
+  connections.CutOffStalled(patience(), apart);
   timer.At(Timer::Clock::now() + apart, [this] { LookAtConnections(); });
 }
 

@@ -8,6 +8,7 @@
 #include "server/handlers/backend.h"
 #include "server/listen/connections.h"
 #include "server/open_sequences.h"
+#include "server/patience.h"
 #include "server/timer.h"
 
 namespace halflight {
@@ -16,11 +17,12 @@ struct SharedByCalls {
   SharedByCalls(const Backend& the_backend, const Access& the_access, Connections& the_connections)
       : backend(the_backend), access(the_access), connections(the_connections) {}
 
-  [[nodiscard]] std::chrono::milliseconds stall_limit() const {
-    return std::chrono::seconds(backend.limits.max_stall_seconds);
+  [[nodiscard]] PatienceLimits patience() const {
+    return {.at_once = std::chrono::seconds(backend.limits.max_stall_seconds),
+            .bytes_per_second = backend.limits.min_bytes_per_second};
   }
   // For a StallGuard: what ends the token's call. It is cancelled, and where that does nothing its
-  // connection is cut off, once that too has stalled for the limit.
+  // connection is cut off, once that too has stalled for as long.
   std::function<void()> StallEnder(CallToken& token);
 
   const Backend backend;

@@ -13,22 +13,26 @@ struct StallGuard::Call {
   bool gone = false;
 };
 
-StallGuard::StallGuard(Timer& timer, std::chrono::milliseconds limit, std::function<void()> stalled)
-    : timer_(timer), limit_(limit), call_(std::make_shared<Call>()) {
+StallGuard::StallGuard(Timer& timer, const PatienceLimits& limits, std::function<void()> stalled)
+    : timer_(timer),
+      unlimited_(limits.at_once.count() == 0),
+      patience_(limits),
+      call_(std::make_shared<Call>()) {
   call_->stalled = std::move(stalled);
 }
 
 StallGuard::~StallGuard() {
-  End();
+  Forget();
   const std::lock_guard lock(call_->mutex);
   call_->gone = true;
 }
 
 void StallGuard::Begin() {
-  if (limit_.count() == 0) {
+  if (unlimited_) {
     return;
   }
-  ticket_ = timer_.At(Timer::Clock::now() + limit_, [call = call_] {
+  begun_ = Timer::Clock::now();
+  ticket_ = timer_.At(begun_ + patience_.left(), [call = call_] {
     const std::lock_guard lock(call->mutex);
     if (!call->gone) {
       call->stalled();
@@ -36,7 +40,12 @@ void StallGuard::Begin() {
   });
 }
 
-void StallGuard::End() {
+void StallGuard::End(uint64_t bytes) {
+  patience_.Spend(Timer::Clock::now() - begun_, bytes);
+  Forget();
+}
+
+void StallGuard::Forget() {
   if (ticket_.has_value()) {
     timer_.Cancel(*ticket_);
     ticket_.reset();

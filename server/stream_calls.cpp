@@ -26,7 +26,7 @@ class UploadCall final : public grpc::ServerReadReactor<grpc::ByteBuffer> {
       : token_(Rpc::kUploadParticles, shared.count, shared.backend, shared.access, context),
         response_(response),
         handler_(shared.backend, token_.caller()),
-        stall_(shared.timer, shared.stall_limit(), shared.StallEnder(token_)) {
+        stall_(shared.timer, shared.patience(), shared.StallEnder(token_)) {
     if (!token_.refusal().ok()) {
       Answer(token_.refusal());
     } else {
@@ -35,7 +35,7 @@ class UploadCall final : public grpc::ServerReadReactor<grpc::ByteBuffer> {
   }
 
   void OnReadDone(bool ok) override {
-    stall_.End();
+    stall_.End(ok ? request_.Length() : 0);
     if (!ok) {
       Answer(handler_.OnEndOfRequests());
       return;
@@ -64,6 +64,7 @@ class UploadCall final : public grpc::ServerReadReactor<grpc::ByteBuffer> {
       response_ = ToByteBuffer(*answer);
     }
     const grpc::Status status = token_.End(answer.status());
+    stall_.Restore();
     stall_.Begin();  // of a peer that reads nothing: until OnDone the call counts
     Finish(status);
   }
@@ -80,8 +81,9 @@ template <typename Reactor, template <typename> typename Sink, typename Response
 class SendingCall : public Reactor, public Sink<Response> {
  public:
   void OnWriteDone(bool ok) override {
-    stall_.End();
-    token_.OnSent(ok ? response_.Length() : 0);
+    const size_t sent = ok ? response_.Length() : 0;
+    stall_.End(sent);
+    token_.OnSent(sent);
     handler_->OnWritten(ok);
   }
   void OnCancel() override {
@@ -96,16 +98,20 @@ class SendingCall : public Reactor, public Sink<Response> {
   SendingCall(Rpc rpc, SharedByCalls& shared, CallbackServerContext& context,
               const std::string& request_id)
       : token_(rpc, shared.count, shared.backend, shared.access, context, request_id),
-        stall_(shared.timer, shared.stall_limit(), shared.StallEnder(token_)),
+        stall_(shared.timer, shared.patience(), shared.StallEnder(token_)),
         handler_(std::make_shared<Handler>(shared.backend, *this, token_.caller())) {}
 
   void Write(const OutgoingMessage<Response>& outgoing) override {
     response_ = ToByteBuffer(outgoing);
+    if (outgoing.message.has_header()) {
+      stall_.Restore();
+    }
     stall_.Begin();
     this->StartWrite(&response_);
   }
   void Finish(const absl::Status& status) override {
     const grpc::Status told = token_.End(status);
+    stall_.Restore();
     stall_.Begin();
     Reactor::Finish(told);
   }

@@ -19,7 +19,7 @@ class UnaryCall final : public grpc::ServerUnaryReactor {
  public:
   UnaryCall(Rpc rpc, SharedByCalls& shared, grpc::CallbackServerContext& context)
       : token_(rpc, shared.count, shared.backend, shared.access, context),
-        stall_(shared.timer, shared.stall_limit(), shared.StallEnder(token_)) {}
+        stall_(shared.timer, shared.patience(), shared.StallEnder(token_)) {}
 
   // Once, last. `handler`: from a request and its caller to an absl::StatusOr of the response. The
   // bytes of the request are let go of, which gRPC would keep as long as the call.

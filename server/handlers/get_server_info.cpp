@@ -31,6 +31,7 @@ v1::GetServerInfoResponse GetServerInfo(const Backend& backend) {
   told.set_max_client_frame_bytes(limits.max_client_frame_bytes);
   told.set_max_frame_seconds(limits.max_frame_seconds);
   told.set_max_stall_seconds(limits.max_stall_seconds);
+  told.set_min_bytes_per_second(limits.min_bytes_per_second);
   told.set_max_calls(limits.max_calls);
   told.set_max_client_calls(limits.max_client_calls);
   told.set_max_partial_uploads(limits.max_partial_uploads);

@@ -30,7 +30,7 @@ bool Connections::Add(int fd, size_t limit) {
   if (open_.size() >= limit) {
     return false;
   }
-  open_[fd] = {.cookie = CookieOf(fd)};
+  open_[fd] = {.cookie = CookieOf(fd), .patience = {}};
   ++added_;
   return true;
 }
@@ -64,22 +64,26 @@ void Connections::ShutDown(int how) {
   }
 }
 
-void Connections::CutOffStalled(std::chrono::milliseconds limit, std::chrono::milliseconds apart) {
+void Connections::CutOffStalled(const PatienceLimits& limits, std::chrono::milliseconds apart) {
   const std::lock_guard lock(mutex_);
   ForgetClosed();
-  const bool first = looked_ - std::exchange(looked_for_stalled_, looked_) > 3 * apart;
+  const auto waited = looked_ - std::exchange(looked_for_stalled_, looked_);
   for (auto& [fd, connection] : open_) {
-    const Backlog backlog = BacklogOf(fd);
-    if (first || backlog.unread == 0 || backlog != connection.backlog) {
-      connection.backlog = backlog;
-      connection.since = looked_;
-    } else if (looked_ - connection.since >= limit) {
+    const Backlog before = std::exchange(connection.backlog, BacklogOf(fd));
+    const auto& [unread, taken] = connection.backlog;
+    auto& patience = connection.patience;
+    if (!patience.has_value() || waited > 3 * apart || unread == 0 ||
+        (!taken.has_value() && unread != before.unread)) {
+      patience = Patience(limits);
+      continue;
+    }
+    patience->Spend(waited, taken.value_or(0) - before.taken.value_or(0));
+    if (patience->left().count() == 0) {
       shutdown(fd, SHUT_RDWR);
     }
   }
 }
 
-// Of a unix socket the kernel counts what is unread alone.
 Connections::Backlog Connections::BacklogOf(int fd) {
   Backlog backlog;
   ioctl(fd, SIOCOUTQ, &backlog.unread);

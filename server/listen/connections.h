@@ -6,7 +6,10 @@
 #include <cstddef>
 #include <cstdint>
 #include <mutex>
+#include <optional>
 #include <unordered_map>
+
+#include "server/patience.h"
 
 namespace halflight {
 
@@ -33,28 +36,28 @@ class Connections {
   // Nothing more is sent either: what waits for peers that take nothing is let go of.
   void CutOff();
 
-  // Of those whose peers have left unread what was sent to them and have taken nothing of it for
-  // `limit`, as far as looks tell: to be called again and again, `apart` from one another. What was
-  // seen before a longer pause does not count.
+  // Of those whose peers leave unread what was sent to them, or take too little of it, until there
+  // is no patience left, as far as looks tell: to be called again and again, `apart` from one
+  // another. What was seen before a longer pause does not count.
   //
   // gRPC 1.51 cancels no call while it writes to the call's socket, and so not at all where that is
   // full and the peer's kernel alone answers for it: a process that was stopped, or one that reads
   // nothing. Only when the socket ends do the calls. (Can go when gRPC fails what waits behind a
   // write without waiting for the write.)
-  void CutOffStalled(std::chrono::milliseconds limit, std::chrono::milliseconds apart);
+  void CutOffStalled(const PatienceLimits& limits, std::chrono::milliseconds apart);
 
  private:
   using Clock = std::chrono::steady_clock;
-  // What is left unread, bytes, and how much was ever taken, where the kernel counts that.
+  // What is left unread, bytes, and how much was ever taken. Of a unix socket the kernel does not
+  // count that, and any change of what is left stands for it.
   struct Backlog {
     int unread = 0;
-    uint64_t taken = 0;
-    bool operator==(const Backlog&) const = default;
+    std::optional<uint64_t> taken;
   };
   struct Connection {
     uint64_t cookie = 0;
-    Backlog backlog{};
-    Clock::time_point since{};  // when it was first seen to be so
+    Backlog backlog{};  // when it was last looked at
+    std::optional<Patience> patience;
   };
 
   static Backlog BacklogOf(int fd);

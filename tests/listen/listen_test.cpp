@@ -260,15 +260,15 @@ TEST(Connections, OfThoseThatTakeNothingAreCutOff) {
       ASSERT_EQ(write(pair->ours, part.data(), part.size()), size);
     }
   }
-  connections.CutOffStalled(milliseconds(20), std::chrono::minutes(1));
-  connections.CutOffStalled(milliseconds(20), std::chrono::minutes(1));
+  connections.CutOffStalled({.at_once = milliseconds(20)}, std::chrono::minutes(1));
+  connections.CutOffStalled({.at_once = milliseconds(20)}, std::chrono::minutes(1));
   std::this_thread::sleep_for(milliseconds(30));
   ASSERT_EQ(read(slow.theirs, part.data(), part.size()), size);
-  connections.CutOffStalled(milliseconds(20), milliseconds(1));
+  connections.CutOffStalled({.at_once = milliseconds(20)}, milliseconds(1));
   EXPECT_FALSE(stopped.IsCutOff()) << "that was long ago";
   std::this_thread::sleep_for(milliseconds(30));
   ASSERT_EQ(read(slow.theirs, part.data(), part.size()), size);
-  connections.CutOffStalled(milliseconds(20), std::chrono::minutes(1));
+  connections.CutOffStalled({.at_once = milliseconds(20)}, std::chrono::minutes(1));
   EXPECT_TRUE(stopped.IsCutOff());
   EXPECT_FALSE(slow.IsCutOff());
   EXPECT_FALSE(idle.IsCutOff());
@@ -281,7 +281,7 @@ int UnreadOf(int fd) {
 }
 
 // What is sent as fast as it is taken is never less.
-TEST(Connections, OfThoseThatTakeSomethingStayWhateverIsLeft) {
+TEST(Connections, OfThoseThatTakeSomethingStayWhateverIsLeftUnlessItIsTooLittle) {
   auto sockets = ListeningSocket::Bind("127.0.0.1:0");
   ASSERT_TRUE(sockets.ok() && sockets->front().Listen().ok());
   ClientSocket client;
@@ -291,8 +291,6 @@ TEST(Connections, OfThoseThatTakeSomethingStayWhateverIsLeft) {
   const FileDescriptor ours(
       accept4(sockets->front().fd(), nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC));
   ASSERT_TRUE(ours.ok());
-  Connections connections;
-  ASSERT_TRUE(connections.Add(ours.get(), 1));
   std::string bytes(1 << 16, 'x');
   int unread = -1;
   ASSERT_EQ(write(ours.get(), bytes.data(), bytes.size()), static_cast<ssize_t>(bytes.size()));
@@ -302,8 +300,8 @@ TEST(Connections, OfThoseThatTakeSomethingStayWhateverIsLeft) {
     return unread > 0 && unread == was;
   }));
   const int before = unread;
-  for (int i = 0; i < 3; ++i) {
-    connections.CutOffStalled(milliseconds(20), std::chrono::minutes(1));
+  const auto take_and_send = [&](Connections& connections, const PatienceLimits& limits) {
+    connections.CutOffStalled(limits, std::chrono::minutes(1));
     std::this_thread::sleep_for(milliseconds(30));
     ASSERT_TRUE(WaitFor([&] {
       EXPECT_GE(recv(client.fd(), bytes.data(), 64, MSG_DONTWAIT), -1);
@@ -314,9 +312,23 @@ TEST(Connections, OfThoseThatTakeSomethingStayWhateverIsLeft) {
       ASSERT_GT(send(ours.get(), bytes.data(), std::min(missing, bytes.size()), MSG_NOSIGNAL), 0);
     }
     ASSERT_EQ(UnreadOf(ours.get()), before);
+    connections.CutOffStalled(limits, std::chrono::minutes(1));
+  };
+  Connections lenient;
+  ASSERT_TRUE(lenient.Add(ours.get(), 1));
+  for (int i = 0; i < 3; ++i) {
+    ASSERT_NO_FATAL_FAILURE(take_and_send(lenient, {.at_once = milliseconds(20)}));
   }
-  connections.CutOffStalled(milliseconds(20), std::chrono::minutes(1));
   EXPECT_EQ(send(ours.get(), "x", 1, MSG_NOSIGNAL), 1);
+  ASSERT_TRUE(WaitFor([&] {
+    EXPECT_GE(recv(client.fd(), bytes.data(), 64, MSG_DONTWAIT), -1);
+    return UnreadOf(ours.get()) <= before;
+  }));
+  Connections strict;
+  ASSERT_TRUE(strict.Add(ours.get(), 1));
+  ASSERT_NO_FATAL_FAILURE(
+      take_and_send(strict, {.at_once = milliseconds(20), .bytes_per_second = 1'000'000'000}));
+  EXPECT_EQ(send(ours.get(), "x", 1, MSG_NOSIGNAL), -1);
 }
 
 TEST(ListeningSocket, TellsWhereItIsAndWhetherOthersCanConnect) {

@@ -176,6 +176,7 @@ TEST(Options, HelpNamesEveryFlagAndRunsNothing) {
                            "--max-client-set-bytes",
                            "--max-frame-seconds",
                            "--max-stall-seconds",
+                           "--min-bytes-per-second",
                            "--max-calls",
                            "--max-client-calls",
                            "--max-connections",

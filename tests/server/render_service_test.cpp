@@ -189,6 +189,33 @@ TEST_F(ImpatientService, ReaderThatStopsReadingLosesItsCallAndHoldsNothing) {
   EXPECT_EQ(reader->Finish().error_code(), grpc::StatusCode::CANCELLED);
 }
 
+class StrictService : public Service {
+ protected:
+  StrictService() : Service({.max_stall_seconds = 1, .min_bytes_per_second = kGiB}) {}
+};
+
+TEST_F(StrictService, ReaderThatTakesTooLittleLosesItsCallHoweverSteady) {
+  grpc::ClientContext context;
+  auto reader = stub_->RenderFrame(&context, LargeRequest());
+  v1::RenderFrameResponse response;
+  while (reader->Read(&response)) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(200));
+  }
+  EXPECT_EQ(reader->Finish().error_code(), grpc::StatusCode::CANCELLED);
+}
+
+TEST_F(StrictService, UploadThatSendsTooLittleLosesItsCallHoweverSteady) {
+  grpc::ClientContext context;
+  v1::UploadParticlesResponse response;
+  const auto writer = stub_->UploadParticles(&context, &response);
+  const auto header =
+      testing::Header(testing::Describe(MakeParticles(1000, {v1::PARTICLE_ATTRIBUTE_POSITION})));
+  for (bool wrote = writer->Write(header); wrote; wrote = writer->Write(testing::Chunk("x"))) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(200));
+  }
+  EXPECT_EQ(writer->Finish().error_code(), grpc::StatusCode::CANCELLED);
+}
+
 TEST_F(ImpatientService, UploadThatStopsSendingLosesItsCall) {
   grpc::ClientContext context;
   v1::UploadParticlesResponse response;
