@@ -8,6 +8,7 @@
 #include <string>
 #include <system_error>
 
+#include <malloc.h>
 #include <sys/resource.h>
 #include <unistd.h>
 
@@ -61,6 +62,10 @@ std::vector<prometheus::MetricFamily> ProcessState() {
     state.push_back(GaugeOf("process_resident_memory_bytes", "Memory in RAM",
                             {{.value = number(24) * static_cast<double>(sysconf(_SC_PAGESIZE))}}));
   }
+  // Of glibc's allocator. What grows while this does not is what lies between allocations.
+  const struct mallinfo2 heap = mallinfo2();
+  state.push_back(GaugeOf("process_heap_bytes", "Memory allocated and not freed",
+                          {{.value = static_cast<double>(heap.uordblks + heap.hblkhd)}}));
   std::error_code error;
   if (const std::filesystem::directory_iterator open("/proc/self/fd", error); !error) {
     state.push_back(

@@ -17,6 +17,7 @@
 #include "server/metrics/prometheus_metrics.h"
 #include "tests/metrics/page.h"
 #include "tests/process/wait_for.h"
+#include "tests/sanitizers.h"
 #include "tests/server/fake_engine.h"
 
 namespace halflight {
@@ -138,6 +139,7 @@ TEST(ServerState, IsReadWhenSomebodyLooks) {
   EXPECT_EQ(page["halflight_serving"], 1.0);
   EXPECT_EQ(page["halflight_connections"], 0.0);
   EXPECT_GT(page["process_resident_memory_bytes"], 1e6);
+  EXPECT_GT(page["process_heap_bytes"], testing::kSanitized ? -1.0 : 1e5) << "of glibc's allocator";
   EXPECT_GT(page["process_threads"], 2.0);
   EXPECT_GT(page["process_open_fds"], 3.0);
   EXPECT_GT(page["process_start_time_seconds"], 1.6e9);

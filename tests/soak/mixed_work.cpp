@@ -185,6 +185,7 @@ void RunMixedWork(Run& run) {
   const int turns = run.Of(23, 8);
   const int warm = run.Of(5, 2);
   std::vector<Point> held;
+  std::vector<Point> allocated;  // of it
   const auto begin = Clock::now();
   for (int i = 0; i < turns; ++i) {
     DoWork(clients, turn);
@@ -194,9 +195,12 @@ void RunMixedWork(Run& run) {
     }
     const std::chrono::duration<double, std::ratio<3600>> hours = Clock::now() - begin;
     const double megabytes = server.Megabytes();
-    std::fprintf(stderr, "soak: turn %d, %.1f s: %.3f MiB\n", i, hours.count() * 3600.0, megabytes);
+    const double heap = server.Metric("process_heap_bytes").value_or(0.0) / (1 << 20);
+    std::fprintf(stderr, "soak: turn %d, %.1f s: %.3f MiB, %.3f MiB allocated\n", i,
+                 hours.count() * 3600.0, megabytes, heap);
     if (i >= warm) {
       held.push_back({hours.count(), megabytes});
+      allocated.push_back({hours.count(), heap});
     }
   }
   const Slope slope = SlopeOf(held);
@@ -213,6 +217,12 @@ void RunMixedWork(Run& run) {
     run.report.AtMost("memory more an hour, once warm", slope.value, 1, " MiB");
     run.report.Tell("the same, 95 % interval",
                     Digits(slope.low) + " to " + Digits(slope.high) + " MiB");
+  }
+  if (!run.short_form) {
+    const Slope heap = SlopeOf(allocated);
+    run.report.Tell("of it allocated and not freed, an hour", Digits(heap.value) + " MiB");
+    run.report.Tell("the same of that, 95 % interval",
+                    Digits(heap.low) + " to " + Digits(heap.high) + " MiB");
   }
   run.report.Holds("serves afterwards", server.Serves());
 }
