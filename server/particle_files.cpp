@@ -30,10 +30,8 @@ constexpr char kSuffix[] = ".particles";
 constexpr char kTemporarySuffix[] = ".particles.writing";
 
 // What a file takes on disk: that of a set of few particles is far larger than the set.
-uint64_t BlockBytes(uint64_t bytes) {
-  constexpr uint64_t kBlock = 4096;
-  return (bytes + kBlock - 1) / kBlock * kBlock;
-}
+constexpr uint64_t kBlock = 4096;
+uint64_t BlockBytes(uint64_t bytes) { return (bytes + kBlock - 1) / kBlock * kBlock; }
 
 // The set stays in memory only.
 void LogNotWritten(const std::string& sha256, const std::string& why) {
@@ -173,6 +171,12 @@ bool ParticleFiles::Use(const std::string& sha256) {
     writer_.Post([this, sha256] { SetTime(sha256); });
   }
   return true;
+}
+
+uint64_t ParticleFiles::LeastMemoryBytes(const std::string& sha256) const {
+  const std::lock_guard lock(mutex_);
+  const auto found = by_name_.find(sha256);
+  return found == by_name_.end() ? 0 : found->second->bytes - kBlock;
 }
 
 void ParticleFiles::SetTime(const std::string& sha256) {

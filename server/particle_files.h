@@ -63,6 +63,9 @@ class ParticleFiles {
   // bounds how many wait.
   void Read(const std::string& sha256, std::stop_token stop, Done done);
 
+  // What the set takes in memory, at least: its file is counted in blocks. 0 where it is not here.
+  [[nodiscard]] uint64_t LeastMemoryBytes(const std::string& sha256) const;
+
   // Whether nothing waits to be written.
   [[nodiscard]] bool idle() const;
   // Of all files that are written, each counted in blocks.

@@ -66,6 +66,10 @@ bool ParticleStore::OnDiskOnly(const std::string& sha256) {
 
 void ParticleStore::Fetch(const std::string& sha256, std::stop_token stop,
                           std::function<void(const absl::Status&)> then) {
+  if (absl::Status room = CheckRoom(files_->LeastMemoryBytes(sha256)); !room.ok()) {
+    then(room);
+    return;
+  }
   files_->Read(sha256, std::move(stop), [this, sha256, then = std::move(then)](const auto& set) {
     const bool read = set.ok() && *set != nullptr;
     ++(read ? disk_reads_ : failed_disk_reads_);

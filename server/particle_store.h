@@ -58,8 +58,9 @@ class ParticleStore {
 
   // Reads the set from disk into memory, on another thread, which then calls `then`: with OK also
   // where the file turned out to be damaged or gone, and where `stop` was requested before it was
-  // read; with the error of Insert where it finds no room; Unavailable, with reason and retry hint,
-  // where its file cannot be opened just now. Only where there is a cache directory.
+  // read; Unavailable, with reason and retry hint, where its file cannot be opened just now. Where
+  // it finds no room `then` has the error of Insert, at once if that can be told before it is read.
+  // Only where there is a cache directory.
   void Fetch(const std::string& sha256, std::stop_token stop,
              std::function<void(const absl::Status&)> then);
 

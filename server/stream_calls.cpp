@@ -165,7 +165,7 @@ class RenderSequenceCall final
     if (auto message = TakeMessage<v1::RenderSequenceRequest>(request_); message.ok()) {
       // It keeps what it is sent, which is bounded by what is known.
       message->DiscardUnknownFields();
-      handler_->OnRequest(*message);
+      handler_->OnRequest(*std::move(message));
     } else {
       handler_->OnUnreadableRequest(message.status());
     }

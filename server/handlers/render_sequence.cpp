@@ -12,14 +12,14 @@
 
 namespace halflight {
 
-void RenderSequenceHandler::OnRequest(const v1::RenderSequenceRequest& request) {
+void RenderSequenceHandler::OnRequest(v1::RenderSequenceRequest request) {
   {
     const std::lock_guard lock(mutex_);
     AddSlot(request.frame().request_id());
     if (draining_) {
       Refuse(DrainingError());
     } else {
-      waiting_.emplace().request = request.frame();
+      waiting_.emplace().request = std::move(*request.mutable_frame());
       may_submit_ = true;
     }
   }
@@ -56,8 +56,8 @@ void RenderSequenceHandler::Refuse(const absl::Status& status) {
 }
 
 // By the thread that advances, and nobody else touches the frame that waits meanwhile: hands it to
-// the pipeline, or has its set read from disk first, which others may have pushed out of memory
-// since the last time.
+// the pipeline, or has its set read from disk first, which others may push out of memory at any
+// time.
 void RenderSequenceHandler::Submit() {
   const std::string sha256 = state_.SetWanted(waiting_->request.scene());
   std::unique_lock lock(mutex_);
@@ -75,6 +75,8 @@ void RenderSequenceHandler::Submit() {
   lock.lock();
   if (status.ok()) {
     waiting_.reset();
+  } else if (absl::IsNotFound(status) && backend_.store.OnDiskOnly(sha256)) {
+    may_submit_ = true;
   } else if (waiting_->job.has_value()) {
     WaitOrRefuse(status);
   } else {

@@ -45,7 +45,7 @@ class RenderSequenceHandler : public std::enable_shared_from_this<RenderSequence
 
   // Once, first.
   void Start() { Advance(); }
-  void OnRequest(const v1::RenderSequenceRequest& request);
+  void OnRequest(v1::RenderSequenceRequest request);
   // Instead, where what came cannot be taken for this reason: refused as a frame that asks for
   // nonsense is.
   void OnUnreadableRequest(const absl::Status& why);

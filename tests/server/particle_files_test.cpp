@@ -179,6 +179,16 @@ TEST_F(Files, SetLargerThanTheDirectoryMayBeIsNotWritten) {
   EXPECT_TRUE(files->Use(small.sha256));
 }
 
+TEST_F(Files, NameThatLooksLikeAPathStaysInTheDirectory) {
+  const std::string name = "../../../../../../../tmp/escaped";
+  ASSERT_EQ(name.size(), kSha256Bytes);
+  const auto files = Open();
+  EXPECT_FALSE(files->Use(name));
+  Write(*files, {name, SetOf(1).set});
+  EXPECT_TRUE(fs::exists(PathOf(name)));
+  EXPECT_EQ(Read(*files, name), nullptr) << "it is not what its name says";
+}
+
 TEST_F(Files, EmptySetIsNotWritten) {
   const auto files = Open();
   const NamedParticles empty = SetOf(0);
