@@ -103,8 +103,12 @@ absl::StatusOr<DrawnFrame> FrameRenderer::Draw(const ShadowTechnique& technique,
     case DeviceFault::kInnocentReset:
       reset_ = DeviceResetError(true);
       break;
-    case DeviceFault::kOutOfMemory:
+    case DeviceFault::kOutOfMemory: {
+      // As a driver may say it: of the last thing that was asked for, when all others are there.
+      absl::StatusOr<DrawnFrame> drawn = technique.Draw(context);
+      if (!drawn.ok()) return drawn;
       return absl::ResourceExhaustedError("planned: the device is out of memory");
+    }
     case DeviceFault::kHang:
       for (;;) std::this_thread::sleep_for(std::chrono::hours(1));
     case DeviceFault::kLate: {
@@ -151,6 +155,7 @@ absl::Status FrameRenderer::Record(Begun& frame) {
     if (frames_in_flight_ > 1) glFinish();
     gl::ForgetErrors();
     drawn = Draw(technique, context, frame);
+    if (absl::IsResourceExhausted(drawn.status())) cache_.Clear();
   }
   if (!drawn.ok()) return drawn.status();
   frame.drawn = *std::move(drawn);

@@ -51,6 +51,53 @@ inline std::string Health(const std::shared_ptr<grpc::Channel>& channel,
   return CallRaw(channel, "/grpc.health.v1.Health/Check", "", deadline).bytes;
 }
 
+// Listens for health of the whole server, as load balancers do.
+class HealthWatch {
+ public:
+  explicit HealthWatch(const std::shared_ptr<grpc::Channel>& channel) : stub_(channel) {
+    context_.set_deadline(std::chrono::system_clock::now() + std::chrono::seconds(30));
+    call_ = stub_.PrepareCall(&context_, "/grpc.health.v1.Health/Watch", &queue_);
+    call_->StartCall(nullptr);
+    Wait();
+    const grpc::Slice nothing;
+    call_->WriteLast(grpc::ByteBuffer(&nothing, 1), {}, nullptr);
+    Wait();
+  }
+  ~HealthWatch() {
+    context_.TryCancel();
+    grpc::Status status;
+    call_->Finish(&status, nullptr);
+    Wait();
+  }
+  HealthWatch(const HealthWatch&) = delete;
+  HealthWatch& operator=(const HealthWatch&) = delete;
+  HealthWatch(HealthWatch&&) = delete;
+  HealthWatch& operator=(HealthWatch&&) = delete;
+
+  // The next that it is told; empty where the stream ends.
+  std::string Next() {
+    grpc::ByteBuffer bytes;
+    call_->Read(&bytes, nullptr);
+    grpc::Slice whole;
+    return Wait() && bytes.DumpToSingleSlice(&whole).ok()
+               ? std::string(reinterpret_cast<const char*>(whole.begin()), whole.size())
+               : "";
+  }
+
+ private:
+  bool Wait() {
+    void* tag = nullptr;
+    bool ok = false;
+    queue_.Next(&tag, &ok);
+    return ok;
+  }
+
+  grpc::GenericStub stub_;
+  grpc::CompletionQueue queue_;
+  grpc::ClientContext context_;
+  std::unique_ptr<grpc::GenericClientAsyncReaderWriter> call_;
+};
+
 // A channel that shares no connection with others.
 inline std::shared_ptr<grpc::Channel> NewChannel(
     const std::string& address, const std::shared_ptr<grpc::ChannelCredentials>& credentials =

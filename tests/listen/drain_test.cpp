@@ -19,6 +19,7 @@ using testing::ClientSocket;
 using testing::Daemon;
 using testing::Folder;
 using testing::Health;
+using testing::HealthWatch;
 using testing::kNotServing;
 using testing::kServing;
 using testing::MakeRequest;
@@ -33,6 +34,8 @@ TEST(Drain, SaysSoThenRefusesConnectionsAndCallsThenFinishesWhatRuns) {
   const std::string address = server.Address();
   const auto balancer = NewChannel(address);
   ASSERT_EQ(Health(balancer), kServing);
+  HealthWatch watch(NewChannel(address));
+  ASSERT_EQ(watch.Next(), kServing);
   client::ClientOptions options;
   options.max_attempts = 1;
   auto client = client::Client::Connect(address, options);
@@ -44,7 +47,8 @@ TEST(Drain, SaysSoThenRefusesConnectionsAndCallsThenFinishesWhatRuns) {
   std::this_thread::sleep_for(std::chrono::milliseconds(300));
 
   server.Signal(SIGTERM);
-  EXPECT_TRUE(WaitFor([&] { return Health(balancer) == kNotServing; }));
+  EXPECT_EQ(watch.Next(), kNotServing);
+  EXPECT_EQ(Health(balancer), kNotServing);
   EXPECT_TRUE(WaitFor([&] { return !ClientSocket().Connect(address); }));
   EXPECT_FALSE(std::filesystem::exists(folder / "socket"));
   EXPECT_EQ(client->GetServerInfo().status().code(), absl::StatusCode::kUnavailable);

@@ -10,6 +10,7 @@
 #include <gtest/gtest.h>
 
 #include "server/convert/convert_frame.h"
+#include "server/error_detail.h"
 #include "tests/server/fake_engine.h"
 
 namespace halflight {
@@ -80,7 +81,13 @@ TEST_P(Validation, RefusesAndNamesFieldAndValue) {
   ASSERT_FALSE(job.ok());
   EXPECT_EQ(job.status().code(), absl::StatusCode::kInvalidArgument);
   EXPECT_THAT(std::string(job.status().message()), StartsWith(GetParam().message));
-  EXPECT_THAT(std::string(job.status().message()), ::testing::HasSubstr("allowed: "));
+  // And to programs in parts.
+  const ErrorDetail detail = DetailOf(job.status());
+  EXPECT_EQ(std::string(job.status().message()),
+            detail.field + ": " + detail.value + ", allowed: " + detail.allowed);
+  EXPECT_THAT(detail.reason,
+              ::testing::AnyOf(v1::ERROR_REASON_INVALID_FIELD, v1::ERROR_REASON_LIMIT_EXCEEDED));
+  EXPECT_FALSE(detail.retry_after.has_value());
 }
 
 std::string NameOf(const ::testing::TestParamInfo<Refusal>& info) { return info.param.name; }
@@ -584,6 +591,7 @@ TEST(Validation, TooManyParticlesAreRefusedForGood) {
   limits.max_particles = 1;
   const auto job = ConvertRequest(request, store, limits, {});
   EXPECT_EQ(job.status().code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_EQ(DetailOf(job.status()).reason, v1::ERROR_REASON_LIMIT_EXCEEDED);
 }
 
 }  // namespace

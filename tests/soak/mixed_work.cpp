@@ -67,6 +67,9 @@ class Client {
     }
   }
 
+  // How many connections there are shall not differ from rest to rest either.
+  void Connect() { Require(testing::Health(channel_) == testing::kServing, "health at rest"); }
+
   // What the server keeps of sets and of work on them is of what it was asked for last: of the same
   // then, whatever came before.
   void AskForAll() {
@@ -190,6 +193,9 @@ void RunMixedWork(Run& run) {
   for (int i = 0; i < turns; ++i) {
     DoWork(clients, turn);
     clients.front().AskForAll();
+    for (Client& client : clients) {
+      client.Connect();
+    }
     if (!run.short_form) {
       server.Rest();
     }

@@ -209,7 +209,8 @@ void RunOverload(Run& run) {
   run.report.Tell("refusals answered within, median", measure::Median(refusals), " ms");
   run.report.TimeAtMost("refusals answered within, 99th percentile",
                         measure::Quantile(refusals, 0.99), 50, " ms");
-  run.report.Tell("refusals answered within, longest", measure::Quantile(refusals, 1.0), " ms");
+  run.report.TimeAtMost("refusals answered within, longest", measure::Quantile(refusals, 1.0), 50,
+                        " ms");
   run.report.Holds("serves afterwards", server.Serves());
 }
 

@@ -39,8 +39,9 @@ std::span<const Scenario> Scenarios() {
                RunUploadClientsKilled},
       Scenario{"upload servers killed",
                "The server killed at random moments of uploads, with a cache directory",
-               "a disk that loses half of a file, and a file half written that is not removed",
-               {"sets found that are not", "files left half written"},
+               "a disk that loses half of a file, a file half written that is not removed, and in "
+               "the end an engine that draws other pixels each time",
+               {"sets found that are not", "files left half written", "pictures that are others"},
                RunUploadServersKilled},
       Scenario{"descriptors",
                "No descriptor left in the server, then some again",

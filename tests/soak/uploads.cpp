@@ -196,19 +196,32 @@ void RunUploadServersKilled(Run& run) {
   }
 
   // What is on disk is whole: each set is there, or sent again.
-  const Server server(folder, flags);
+  std::vector<std::string> last_flags = flags;
+  if (run.sabotage) {
+    last_flags.insert(last_flags.end(), {"--device", "forgets"});
+  }
+  const Server server(folder, last_flags, run.sabotage ? "halflightd_broken" : "halflightd");
+  const testing::Folder other_folder;
+  const Server other(other_folder, {});  // that nothing happened to
   const auto stub = v1::RenderService::NewStub(testing::NewChannel(address));
   auto client = client::Client::Connect(address);
   Require(client.status(), "connect");
+  auto other_client = client::Client::Connect(other.address());
+  Require(other_client.status(), "connect");
   size_t held = 0;
   size_t drawn = 0;
+  size_t different = 0;
   for (const client::EncodedParticles& set : sets) {
     held += Query(*stub, set.sha256).complete() ? 1 : 0;
   }
   for (const client::EncodedParticles& set : sets) {
     v1::RenderFrameRequest request = SweepOf(set.sha256, 32);
     request.mutable_scene()->mutable_material()->set_radius(0.001F);
-    drawn += client->RenderFrame(request, &set).ok() ? 1 : 0;
+    const auto frame = client->RenderFrame(request, &set);
+    const auto expected = other_client->RenderFrame(request, &set);
+    Require(expected.status(), "a frame of a server that was not killed");
+    drawn += frame.ok() ? 1 : 0;
+    different += frame.ok() && frame->outputs != expected->outputs ? 1 : 0;
   }
   run.report.Tell("servers killed", kills, "");
   run.report.AtLeast("of these while a set was being sent", static_cast<double>(while_sent),
@@ -219,6 +232,7 @@ void RunUploadServersKilled(Run& run) {
   run.report.Tell("sets of 40 that the last server had", static_cast<double>(held), "");
   run.report.AtLeast("sets of 40 drawn, sent again where they were missing",
                      static_cast<double>(drawn), static_cast<double>(sets.size()), "");
+  run.report.None("pictures that are others than of a server that was not killed", different);
 }
 
 }  // namespace halflight::soak
