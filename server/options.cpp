@@ -94,8 +94,11 @@ void AddObservabilityFlags(CLI::App& app, Options& options) {
 }
 
 void AddAccessFlags(CLI::App& app, AccessOptions& access) {
-  const auto file = [&app](const std::string& flag, std::string& path, const std::string& help) {
-    app.add_option(flag, path, help)->type_name("FILE")->group("Access");
+  // Left empty by a template, say, it would let everybody in.
+  const CLI::Validator not_empty(
+      [](const std::string& path) { return path.empty() ? "\"\", allowed: a path" : ""; }, "");
+  const auto file = [&](const std::string& flag, std::string& path, const std::string& help) {
+    app.add_option(flag, path, help)->type_name("FILE")->check(not_empty)->group("Access");
   };
   file("--tls-cert", access.tls.certificate,
        "Certificate chain in PEM: connections are encrypted. Files of this group are read again "

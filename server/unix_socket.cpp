@@ -13,17 +13,17 @@
 namespace halflight {
 namespace {
 
+// Where it cannot be told, as of a server that we may not talk to, somebody does.
 bool SomebodyListens(const std::string& path) {
   sockaddr_un address{};
   address.sun_family = AF_UNIX;
   path.copy(address.sun_path, sizeof(address.sun_path) - 1);
   const int probe = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
   if (probe < 0) {
-    return false;
+    return true;
   }
   const int connected = connect(probe, reinterpret_cast<sockaddr*>(&address), sizeof(address));
-  // A full backlog, too, means that somebody is there.
-  const bool listens = connected == 0 || errno == EAGAIN;
+  const bool listens = connected == 0 || errno != ECONNREFUSED;
   close(probe);
   return listens;
 }

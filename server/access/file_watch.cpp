@@ -50,7 +50,8 @@ void FileWatch::Run(const std::stop_token& stop, const std::function<absl::Statu
   bool failed = false;
   while (!wake.wait_for(lock, stop, kInterval, [&] { return stop.stop_requested(); })) {
     std::string state = State();
-    if (state == seen_ && !failed) {
+    const bool changed = state != seen_;
+    if (!changed && !failed) {
       continue;
     }
     seen_ = std::move(state);
@@ -59,7 +60,8 @@ void FileWatch::Run(const std::stop_token& stop, const std::function<absl::Statu
     if (!failed) {
       Log(LogLevel::kInfo, "reloaded", {{"files", files}});
       last_complaint.clear();
-    } else if (const std::string message = MessageOf(status); message != last_complaint) {
+    } else if (const std::string message = MessageOf(status);
+               changed || message != last_complaint) {
       Log(LogLevel::kWarn, "not_reloaded", {{"files", files}, {"message", message}});
       last_complaint = message;
     }

@@ -5,11 +5,13 @@
 #include <cstring>
 #include <memory>
 #include <utility>
+#include <vector>
 
 #include <fmt/format.h>
 #include <openssl/bio.h>
 #include <openssl/err.h>
 #include <openssl/pem.h>
+#include <openssl/ssl.h>
 #include <openssl/x509.h>
 
 namespace halflight {
@@ -21,6 +23,7 @@ struct Free {
   void operator()(BIO* bio) const { BIO_free(bio); }
   void operator()(X509* certificate) const { X509_free(certificate); }
   void operator()(EVP_PKEY* key) const { EVP_PKEY_free(key); }
+  void operator()(SSL_CTX* context) const { SSL_CTX_free(context); }
   void operator()(std::FILE* file) const { std::fclose(file); }
 };
 template <typename T>
@@ -44,21 +47,41 @@ bool EndsInACutLine(const std::string& text) {
   return last.starts_with('-') && !last.starts_with("-----END");
 }
 
-// The first of the file, which must be nothing but certificates.
-absl::StatusOr<Owned<X509>> FirstCertificate(const std::string& path, const std::string& text) {
+// All of the file, which must be nothing but certificates: one at least.
+absl::StatusOr<std::vector<Owned<X509>>> Certificates(const std::string& path,
+                                                      const std::string& text) {
   const Owned<BIO> reader = Reader(text);
-  Owned<X509> first(PEM_read_bio_X509(reader.get(), nullptr, NoPassword, nullptr));
-  if (first == nullptr) {
-    return Wrong(path, "holds no certificate in PEM");
+  std::vector<Owned<X509>> certificates;
+  while (Owned<X509> next{PEM_read_bio_X509(reader.get(), nullptr, NoPassword, nullptr)}) {
+    certificates.push_back(std::move(next));
   }
-  while (Owned<X509>(PEM_read_bio_X509(reader.get(), nullptr, NoPassword, nullptr)) != nullptr) {
+  if (certificates.empty()) {
+    return Wrong(path, "holds no certificate in PEM");
   }
   // What ends the file in order is that no line begins another one.
   if (ERR_GET_REASON(ERR_peek_last_error()) != PEM_R_NO_START_LINE || EndsInACutLine(text)) {
     return Wrong(path, "a certificate behind the first is damaged");
   }
   ERR_clear_error();
-  return first;
+  return certificates;
+}
+
+// Whether OpenSSL would shake hands with them: its security level asks for long enough keys and
+// good enough signatures, of those behind the first too, which gRPC 1.51 finds out with each
+// client.
+absl::Status CheckStrength(const std::string& path, const std::vector<Owned<X509>>& chain) {
+  const Owned<SSL_CTX> context(SSL_CTX_new(TLS_server_method()));
+  for (const Owned<X509>& certificate : chain) {
+    const bool first = certificate == chain.front();
+    const auto ok = first ? SSL_CTX_use_certificate(context.get(), certificate.get())
+                          : SSL_CTX_add1_chain_cert(context.get(), certificate.get());
+    if (ok != 1) {
+      const char* const reason = ERR_reason_error_string(ERR_peek_last_error());
+      return Wrong(path, fmt::format("a certificate that TLS does not take: {}",
+                                     reason == nullptr ? "no reason" : reason));
+    }
+  }
+  return absl::OkStatus();
 }
 
 absl::Status CheckTime(const std::string& path, const X509& certificate) {
@@ -103,11 +126,15 @@ absl::StatusOr<TlsFiles> LoadTlsFiles(const TlsPaths& paths) {
     }
     *text = *std::move(bytes);
   }
-  const auto certificate = FirstCertificate(paths.certificate, files.certificate);
-  if (!certificate.ok()) {
-    return certificate.status();
+  const auto chain = Certificates(paths.certificate, files.certificate);
+  if (!chain.ok()) {
+    return chain.status();
   }
-  if (absl::Status status = CheckTime(paths.certificate, **certificate); !status.ok()) {
+  X509& certificate = *chain->front();
+  if (absl::Status status = CheckTime(paths.certificate, certificate); !status.ok()) {
+    return status;
+  }
+  if (absl::Status status = CheckStrength(paths.certificate, *chain); !status.ok()) {
     return status;
   }
   const Owned<EVP_PKEY> key(
@@ -115,14 +142,14 @@ absl::StatusOr<TlsFiles> LoadTlsFiles(const TlsPaths& paths) {
   if (key == nullptr) {
     return Wrong(paths.key, "holds no private key in PEM without a password");
   }
-  if (X509_check_private_key(certificate->get(), key.get()) != 1) {
+  if (X509_check_private_key(&certificate, key.get()) != 1) {
     return Wrong(paths.key,
                  fmt::format("is not the key of the certificate in {}", paths.certificate));
   }
   if (!paths.client_authorities.empty()) {
-    const auto authority = FirstCertificate(paths.client_authorities, files.client_authorities);
-    if (!authority.ok()) {
-      return authority.status();
+    const auto authorities = Certificates(paths.client_authorities, files.client_authorities);
+    if (!authorities.ok()) {
+      return authorities.status();
     }
   }
   return files;

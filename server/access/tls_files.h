@@ -22,8 +22,8 @@ struct TlsFiles {
 };
 
 // InvalidArgument "<path>: <why>" where a file cannot be read, holds nothing of its kind, the key
-// is not the certificate's or is locked by a password, or the certificate has expired or is not
-// valid yet.
+// is not the certificate's or is locked by a password, the certificate has expired or is not valid
+// yet, or TLS does not take it or one of those behind it.
 absl::StatusOr<TlsFiles> LoadTlsFiles(const TlsPaths& paths);
 
 // The bytes of a file. InvalidArgument "<path>: <why>"; a file of more than a MiB is none of ours.

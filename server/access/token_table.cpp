@@ -1,6 +1,7 @@
 #include "server/access/token_table.h"
 
 #include <algorithm>
+#include <unordered_set>
 
 #include <fmt/format.h>
 #include <openssl/crypto.h>
@@ -18,6 +19,7 @@ absl::StatusOr<TokenTable> TokenTable::Parse(std::string_view text) {
         "line {}: {}; allowed: <SHA-256 of the token, 64 hex digits> <tenant>", line, what));
   };
   TokenTable table;
+  std::unordered_set<std::string> seen;
   const std::vector<std::string> lines =
       absl::StrSplit(absl::string_view(text.data(), text.size()), '\n');
   for (size_t i = 0; i < lines.size(); ++i) {
@@ -39,8 +41,7 @@ absl::StatusOr<TokenTable> TokenTable::Parse(std::string_view text) {
       return wrong(i + 1, "the file ends within it");
     }
     Entry entry{absl::HexStringToBytes(words[0]), words[1]};
-    const auto same = [&](const Entry& other) { return other.sha256 == entry.sha256; };
-    if (std::any_of(table.entries_.begin(), table.entries_.end(), same)) {
+    if (!seen.insert(entry.sha256).second) {
       return wrong(i + 1, "the token stands in an earlier line too");
     }
     table.entries_.push_back(std::move(entry));

@@ -235,9 +235,12 @@ absl::StatusOr<ListeningSocket> ListeningSocket::Adopt(int fd) {
   socklen_t name_length = sizeof(name);
   if (getsockopt(fd, SOL_SOCKET, SO_ACCEPTCONN, &listens, &length) != 0 || listens == 0 ||
       getsockopt(fd, SOL_SOCKET, SO_TYPE, &type, &length) != 0 || type != SOCK_STREAM ||
-      getsockname(fd, &name.any, &name_length) != 0) {
-    return absl::InvalidArgumentError(
-        fmt::format("descriptor {} that was handed over: allowed: stream sockets that listen", fd));
+      getsockname(fd, &name.any, &name_length) != 0 ||
+      (name.any.sa_family != AF_INET && name.any.sa_family != AF_INET6 &&
+       name.any.sa_family != AF_UNIX)) {
+    return absl::InvalidArgumentError(fmt::format(
+        "descriptor {} that was handed over: allowed: stream sockets of TCP or unix that listen",
+        fd));
   }
   fcntl(fd, F_SETFD, FD_CLOEXEC);
   fcntl(fd, F_SETFL, fcntl(fd, F_GETFL) | O_NONBLOCK);

@@ -8,6 +8,7 @@
 #include <openssl/ec.h>
 #include <openssl/evp.h>
 #include <openssl/pem.h>
+#include <openssl/rsa.h>
 #include <openssl/x509.h>
 #include <openssl/x509v3.h>
 
@@ -87,7 +88,7 @@ Authority::Authority() : parts_(std::make_unique<Parts>()) {
 Authority::~Authority() = default;
 
 Issued Authority::Issue(const Subject& subject) const {
-  const Owned<EVP_PKEY> key(EVP_EC_gen("P-256"));
+  const Owned<EVP_PKEY> key(subject.weak ? EVP_RSA_gen(1024) : EVP_EC_gen("P-256"));
   const Owned<X509> made = Draft(subject, *key);
   X509_set_issuer_name(made.get(), X509_get_subject_name(parts_->certificate.get()));
   std::string names;

@@ -19,6 +19,7 @@ struct Subject {
   // From now; both in the past is an expired one.
   int valid_from_seconds = -3600;
   int valid_until_seconds = 3600;
+  bool weak = false;  // a key of RSA of 1024 bits
 };
 
 class Authority {

@@ -56,6 +56,15 @@ TEST_F(TlsFilesTest, ErrorsNameTheFile) {
   EXPECT_THAT(ErrorOf(Write(std::string(2 << 20, 'x'), server_.key)), HasSubstr("too large"));
 }
 
+// gRPC would find out with the first client.
+TEST_F(TlsFilesTest, ThoseThatTlsDoesNotTakeAreRefused) {
+  const Issued weak = authority_.Issue({.common_name = "a", .weak = true});
+  EXPECT_THAT(ErrorOf(Write(weak.certificate, weak.key)),
+              HasSubstr("cert.pem: a certificate that TLS does not take: "));
+  EXPECT_THAT(ErrorOf(Write(server_.certificate + weak.certificate, server_.key)),
+              HasSubstr("cert.pem: a certificate that TLS does not take: "));
+}
+
 TEST_F(TlsFilesTest, HalfWrittenOnesAreRefused) {
   const std::string chain = server_.certificate + authority_.certificate();
   // Without its last line a certificate is none; the first one alone is one, with or without the

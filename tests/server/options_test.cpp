@@ -77,6 +77,8 @@ TEST(Options, SharesOfAClientAreThreeQuartersAndEnoughForOneUnlessToldOtherwise)
   EXPECT_EQ(usual.max_client_frame_bytes, 3 * kGiB);
   EXPECT_EQ(usual.max_client_set_bytes, 3 * kGiB);
   EXPECT_EQ(usual.max_client_upload_bytes, 3 * kGiB);
+  EXPECT_EQ(usual.max_client_connections, 3072U);
+  EXPECT_EQ((*Parse({"--max-connections", "1"}))->limits.max_client_connections, 1U);
   const ServerLimits small = (*Parse({"--max-frame-bytes", "2GiB", "--max-cache-bytes", "1100MiB",
                                       "--max-client-set-bytes", "1050MiB"}))
                                  ->limits;
@@ -135,6 +137,28 @@ TEST(Options, EachLimitIsToldAsItWasSet) {
   }
 }
 
+// And the other way round: no limit but these two, which change how long frames take and not what
+// is accepted, is kept from clients.
+TEST(Options, EachFlagOfALimitIsAFieldOfThem) {
+  std::ostringstream out;
+  ASSERT_TRUE(Parse({"--help"}, &out).ok());
+  const std::string help = out.str();
+  const size_t begin = help.find("\nLimits:");
+  ASSERT_NE(begin, std::string::npos);
+  std::istringstream limits(help.substr(begin + 9, help.find("\n\n", begin + 9) - begin - 9));
+  int flags = 0;
+  for (std::string line; std::getline(limits, line);) {
+    if (line.rfind("  --", 0) == 0) {
+      std::string name = line.substr(4, line.find(' ', 4) - 4);
+      std::replace(name.begin(), name.end(), '-', '_');
+      const bool told = v1::ServerLimits::descriptor()->FindFieldByName(name) != nullptr;
+      EXPECT_NE(told, name == "max_reuse_bytes" || name == "frames_in_flight") << name;
+      ++flags;
+    }
+  }
+  EXPECT_EQ(flags, v1::ServerLimits::descriptor()->field_count() + 2);
+}
+
 TEST(Options, HelpNamesEveryFlagAndRunsNothing) {
   std::ostringstream out;
   const auto options = Parse({"--help"}, &out);
@@ -180,6 +204,7 @@ TEST(Options, HelpNamesEveryFlagAndRunsNothing) {
                            "--max-calls",
                            "--max-client-calls",
                            "--max-connections",
+                           "--max-client-connections",
                            "--max-connection-streams",
                            "--max-handshake-seconds",
                            "--max-idle-seconds",
@@ -202,7 +227,11 @@ TEST(Options, ErrorsNameFlagValueAndWhatIsAllowed) {
               HasSubstr("--log-level: loud, allowed: trace, debug"));
   EXPECT_THAT(ErrorOf({"--max-image-size", "0"}), HasSubstr("--max-image-size: 0, allowed: [1,"));
   EXPECT_THAT(ErrorOf({"--max-message-bytes", "1000"}), HasSubstr("--max-message-bytes: 1000"));
-  EXPECT_THAT(ErrorOf({"--max-queued-frames", "-3"}), HasSubstr("--max-queued-frames"));
+  for (const char* wrong : {"-3", "010", "1e3", ""}) {
+    EXPECT_THAT(ErrorOf({"--max-queued-frames", wrong}),
+                HasSubstr("--max-queued-frames: " + std::string(wrong) + ", allowed: "));
+    EXPECT_THAT(ErrorOf({"--max-reference-work", wrong}), HasSubstr("--max-reference-work: "));
+  }
   EXPECT_THAT(ErrorOf({"--max-cache-bytes", "1MiB", "--max-particle-bytes", "2MiB"}),
               HasSubstr("--max-cache-bytes: 1048576, allowed: at least --max-particle-bytes"));
   EXPECT_THAT(
@@ -231,6 +260,7 @@ TEST(Options, CertificateAndKeyComeTogether) {
   EXPECT_THAT(ErrorOf({"--tls-key", "a.pem"}), HasSubstr("--tls-cert: "));
   EXPECT_THAT(ErrorOf({"--tls-client-ca", "a.pem"}),
               HasSubstr("--tls-client-ca: a.pem, allowed: "));
+  EXPECT_THAT(ErrorOf({"--token-file", ""}), HasSubstr("--token-file: \"\", allowed: "));
   EXPECT_THAT(ErrorOf({"--max-connections", "0"}), HasSubstr("--max-connections: 0, allowed: [1,"));
   EXPECT_THAT(ErrorOf({"--max-idle-seconds", "0"}), HasSubstr("--max-idle-seconds: 0"));
 }
