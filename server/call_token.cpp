@@ -73,18 +73,22 @@ CallToken::CallToken(Rpc rpc, CallCount& count, const Backend& backend, const Ac
   ++count_.begun;
   ++count_.active_of[static_cast<size_t>(rpc)];
   ++count_.active;
+  ++count_.served;
+  refusal_ = Enter(access, backend.limits);
+  entered_ = refusal_.ok();
+  count_.served -= entered_ ? 0 : 1;
+}
+
+absl::Status CallToken::Enter(const Access& access, const ServerLimits& limits) {
   if (count_.draining) {
-    refusal_ = DrainingError();
-    return;
+    return DrainingError();
   }
-  auto tenant = access.TenantOf(context);
+  auto tenant = access.TenantOf(context_);
   if (!tenant.ok()) {
-    refusal_ = WithReason(tenant.status(), v1::ERROR_REASON_UNAUTHENTICATED);
-    return;
+    return WithReason(tenant.status(), v1::ERROR_REASON_UNAUTHENTICATED);
   }
   caller_.tenant = *std::move(tenant);
-  refusal_ = count_.Enter(caller_.client(), backend.limits);
-  entered_ = refusal_.ok();
+  return count_.Enter(caller_.client(), limits);
 }
 
 CallToken::~CallToken() {
@@ -94,6 +98,7 @@ CallToken::~CallToken() {
   WriteLog(outcome, by);
   if (entered_) {
     count_.Leave(caller_.client());
+    --count_.served;
   }
   count_.stalled -= stalled_ ? 1 : 0;
   --count_.active_of[static_cast<size_t>(rpc_)];
@@ -113,6 +118,11 @@ Cancellation CallToken::EndedBy() const {
 
 void CallToken::WriteLog(const absl::Status& outcome, Cancellation by) const {
   LogFields fields = {{"rpc", NameOf(rpc_)}, {"request_id", caller_.call_id}};
+  // Whoever is refused can call again at once, and for ever.
+  const auto refused = entered_ ? std::nullopt : count_.refusals_told.Take();
+  if (refused.has_value()) {
+    fields.emplace_back("since_last_told", *refused);
+  }
   if (!caller_.tenant.empty()) {
     fields.emplace_back("tenant", caller_.tenant);
   }
@@ -129,7 +139,7 @@ void CallToken::WriteLog(const absl::Status& outcome, Cancellation by) const {
     fields.emplace_back("message", MessageOf(outcome));
   }
   // Frames that went well have lines of their own, and questions are many.
-  const bool told = !outcome.ok() || rpc_ == Rpc::kUploadParticles;
+  const bool told = entered_ ? !outcome.ok() || rpc_ == Rpc::kUploadParticles : refused.has_value();
   const bool our_fault = absl::IsInternal(outcome) && by == Cancellation::kNone;
   Log(our_fault ? LogLevel::kWarn : told ? LogLevel::kInfo : LogLevel::kDebug, "call", fields);
 }

@@ -17,6 +17,7 @@
 #include "server/caller.h"
 #include "server/client_counts.h"
 #include "server/handlers/backend.h"
+#include "server/log/log_budget.h"
 #include "server/metrics/metrics.h"
 
 namespace halflight {
@@ -24,9 +25,11 @@ namespace halflight {
 // How many calls are under way, and whether more may come.
 struct CallCount {
   std::atomic<int> active = 0;
+  std::atomic<int> served = 0;  // of the active: those that were not refused, or not yet
   std::array<std::atomic<int>, kRpcs> active_of{};
   std::atomic<int> stalled = 0;  // of the active: those that should have ended for it
   std::atomic<uint64_t> begun = 0;
+  LogBudget refusals_told{20};
   std::atomic<bool> draining = false;
 
   // One more of a client's calls; or nothing changes, and the error says whose calls are too many.
@@ -38,8 +41,9 @@ struct CallCount {
   ClientCounts entered_;  // of those that are active: who is refused takes nobody's place
 };
 
-// Counted before draining is looked at, so that whoever drains and then sees no calls can be sure
-// that none slips in, and that the log has a line of each.
+// Counted as served before draining is looked at, so that whoever drains and then sees none can be
+// sure that none slips in, and that the log has a line of each. Those that are refused hold nobody
+// up.
 class CallToken {
  public:
   // At the beginning of a call, whose name the client learns by its initial metadata: the one that
@@ -71,6 +75,7 @@ class CallToken {
   grpc::Status End(const absl::Status& status);
 
  private:
+  absl::Status Enter(const Access& access, const ServerLimits& limits);
   [[nodiscard]] Cancellation EndedBy() const;
   void WriteLog(const absl::Status& outcome, Cancellation by) const;
 

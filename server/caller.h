@@ -2,7 +2,8 @@
 #pragma once
 
 #include <string>
-#include <string_view>
+
+#include "server/machine.h"
 
 namespace halflight {
 
@@ -11,15 +12,12 @@ struct Caller {
   std::string peer{};     // its address, as gRPC writes it
   std::string call_id{};  // the name that the call is found by in the log
 
-  // By whom shares are counted: the tenant, or the address without its port, since a client has
-  // many.
+  // By whom shares are counted: the tenant, or the machine, of which a client has many ports.
   [[nodiscard]] std::string client() const {
     if (!tenant.empty()) {
       return "tenant:" + tenant;
     }
-    const std::string_view address = peer;
-    const bool has_port = address.substr(0, 4) == "ipv4" || address.substr(0, 4) == "ipv6";
-    return std::string(has_port ? address.substr(0, address.rfind(':')) : address);
+    return MachineOf(peer);
   }
 };
 

@@ -22,6 +22,7 @@
 #include "halflight/v1/service.grpc.pb.h"
 #include "server/listen/acceptor.h"
 #include "server/log/log.h"
+#include "server/log/log_budget.h"
 #include "server/render_service.h"
 
 namespace halflight {
@@ -32,8 +33,16 @@ constexpr std::chrono::milliseconds kShutdownGrace{200};
 
 // gRPC's own complaints belong in the same log, in the same form.
 void ForwardLog(gpr_log_func_args* line) {
-  Log(line->severity == GPR_LOG_SEVERITY_ERROR ? LogLevel::kWarn : LogLevel::kDebug, "grpc",
-      {{"message", line->message}});
+  static LogBudget budget(20);  // of strangers, too, whose handshakes fail
+  LogFields fields = {{"message", line->message}};
+  LogLevel level = LogLevel::kDebug;
+  if (line->severity == GPR_LOG_SEVERITY_ERROR) {
+    if (const auto count = budget.Take()) {
+      level = LogLevel::kWarn;
+      fields.emplace_back("since_last_told", *count);
+    }
+  }
+  Log(level, "grpc", fields);
 }
 
 // Protobuf complains of messages that peers sent, each of which has its error.
@@ -136,7 +145,8 @@ absl::StatusOr<std::unique_ptr<GrpcServer>> GrpcServer::Start(std::vector<Listen
     }
   }
   auto acceptor = Acceptor::Start(
-      std::move(sockets), started->parts_->connections, backend.limits.max_connections,
+      std::move(sockets), started->parts_->connections,
+      {.all = backend.limits.max_connections, .one_machine = backend.limits.max_client_connections},
       [to_server = started->parts_->to_server.get()](int fd) {
         grpc::experimental::ExternalConnectionAcceptor::NewConnectionParameters connection;
         connection.fd = fd;
@@ -179,7 +189,7 @@ void GrpcServer::BeginDrain() {
   parts_->acceptor->Stop();
 }
 
-bool GrpcServer::idle() const { return parts_->service.active_calls() == 0; }
+bool GrpcServer::idle() const { return parts_->service.served_calls() == 0; }
 
 int GrpcServer::calls(Rpc rpc) const { return parts_->service.active_calls(rpc); }
 

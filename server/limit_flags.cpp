@@ -18,8 +18,17 @@ void AddLimitFlags(CLI::App& app, Options& options) {
           ->type_name("DIRECTORY");
 
   ServerLimits& limits = options.limits;
-  const auto number = [&app](const std::string& flag, auto& value, const std::string& help) {
-    app.add_option(flag, value, help)->capture_default_str()->group("Limits");
+  // CLI11 2.1 takes -1 for the largest number there is, and 010 for 8.
+  const CLI::Validator decimal(
+      [](const std::string& text) {
+        const bool ok = !text.empty() &&
+                        text.find_first_not_of("0123456789") == std::string::npos &&
+                        (text.size() == 1 || text[0] != '0');
+        return ok ? "" : text + ", allowed: a whole number from 0 on";
+      },
+      "");
+  const auto number = [&](const std::string& flag, auto& value, const std::string& help) {
+    app.add_option(flag, value, help)->capture_default_str()->check(decimal)->group("Limits");
   };
   // The conversion of sizes takes -1 for the largest number there is.
   const CLI::Validator not_negative(
@@ -92,6 +101,8 @@ void AddLimitFlags(CLI::App& app, Options& options) {
   bytes("--max-message-bytes", limits.max_message_bytes, "Largest message received");
   number("--max-connections", limits.max_connections,
          "Connections of all clients together; fewer where the limit on open files wants it");
+  number("--max-client-connections", limits.max_client_connections,
+         "Of these, those from one machine; three quarters if unset");
   number("--max-connection-streams", limits.max_connection_streams, "Calls of one connection");
   number("--max-handshake-seconds", limits.max_handshake_seconds,
          "From connecting until TLS and HTTP/2 are set up");
@@ -109,6 +120,9 @@ void FillInShares(const CLI::App& app, ServerLimits& limits) {
         limits.max_particle_bytes);
   share("--max-client-upload-bytes", limits.max_client_upload_bytes, limits.max_cache_bytes,
         limits.max_particle_bytes);
+  if (app.count("--max-client-connections") == 0) {
+    limits.max_client_connections = limits.max_connections - limits.max_connections / 4;
+  }
 }
 
 void CheckLimits(const Options& options, FieldChecks& checks) {
@@ -144,6 +158,8 @@ void CheckLimits(const Options& options, FieldChecks& checks) {
   checks.InRange("--max-message-bytes", limits.max_message_bytes,
                  {.low = 128.0 * 1024.0, .high = std::numeric_limits<int32_t>::max()});
   checks.InRange("--max-connections", limits.max_connections, {.low = 1.0, .high = 1e6});
+  checks.InRange("--max-client-connections", limits.max_client_connections,
+                 {.low = 1.0, .high = 1e6});
   checks.InRange("--max-connection-streams", limits.max_connection_streams,
                  {.low = 1.0, .high = 65536.0});
   checks.InRange("--max-handshake-seconds", limits.max_handshake_seconds,

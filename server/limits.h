@@ -32,7 +32,7 @@ struct ServerLimits {
   uint64_t max_client_frame_bytes = 3 * kGiB;
   uint32_t max_frame_seconds = 600;
   uint32_t max_stall_seconds = 60;
-  uint64_t min_bytes_per_second = 16384;
+  uint64_t min_bytes_per_second = 8192;
   uint32_t max_calls = 4096;
   uint32_t max_client_calls = 3072;
   // Samples times particles: about a minute on two cores where particles overlap a few hundred
@@ -42,6 +42,7 @@ struct ServerLimits {
   uint32_t partial_upload_seconds = 600;
   uint64_t max_cache_dir_bytes = 16 * kGiB;  // 0: there is no cache directory
   uint32_t max_connections = 4096;
+  uint32_t max_client_connections = 3072;
   uint32_t max_connection_streams = 100;
   uint32_t max_handshake_seconds = 10;
   uint32_t max_idle_seconds = 3600;

@@ -53,8 +53,13 @@ sigset_t BlockTerminationSignals() {
   return signals;
 }
 
-int Fail(int code, const absl::Status& status) {
-  std::cerr << "halflightd: " << status.message() << "\n";
+// `log`: it is started, and has nothing but JSON.
+int Fail(int code, const absl::Status& status, bool log = false) {
+  if (log) {
+    Log(LogLevel::kError, "cannot_start", {{"message", std::string(status.message())}});
+  } else {
+    std::cerr << "halflightd: " << status.message() << "\n";
+  }
   return code;
 }
 
@@ -80,10 +85,14 @@ int Run(const Options& options, std::vector<ListeningSocket> inherited, const si
   std::optional<TerminationWatch> watch(
       std::in_place, signals, std::nullopt,
       ImmediateEnd{EXIT_SUCCESS, "stopped", "told so while it was starting"});
+  const bool json = options.log_format == LogFormat::kJson && options.log_level != "off";
+  const auto fail = [json](int code, const absl::Status& status) {
+    return Fail(code, status, json);
+  };
   // What can be wrong with flags and files shows before the device is started.
   const auto access = Access::Load(options.access);
   if (!access.ok()) {
-    return Fail(kExitCannotStart, access.status());
+    return fail(kExitCannotStart, access.status());
   }
   std::vector<std::string> addresses = options.addresses;
   if (addresses.empty() && inherited.empty()) {
@@ -91,15 +100,15 @@ int Run(const Options& options, std::vector<ListeningSocket> inherited, const si
   }
   auto sockets = ListeningSocket::BindAll(addresses, std::move(inherited));
   if (!sockets.ok()) {
-    return Fail(kExitCannotStart, sockets.status());
+    return fail(kExitCannotStart, sockets.status());
   }
   if (absl::Status status = CheckReach(*sockets, **access, options.access.insecure_listen);
       !status.ok()) {
-    return Fail(kExitBadFlags, status);
+    return fail(kExitBadFlags, status);
   }
   auto metrics_sockets = BindMetricsAddress(options.metrics);
   if (!metrics_sockets.ok()) {
-    return Fail(
+    return fail(
         absl::IsInvalidArgument(metrics_sockets.status()) ? kExitBadFlags : kExitCannotStart,
         metrics_sockets.status());
   }
@@ -113,7 +122,7 @@ int Run(const Options& options, std::vector<ListeningSocket> inherited, const si
                          // Planned faults are those of clients' frames.
                          .warm_up = options.faults == nullptr});
   if (!engine.ok()) {
-    return Fail(kExitCannotStart, engine.status());
+    return fail(kExitCannotStart, engine.status());
   }
   const DeviceInfo& device = (*engine)->device();
   Log(LogLevel::kInfo, "device",
@@ -127,6 +136,9 @@ int Run(const Options& options, std::vector<ListeningSocket> inherited, const si
   ServerLimits limits = LimitsOnDevice(options.limits, device);
   limits.max_connections = std::min(limits.max_connections, RoomForConnections());
   if (limits.max_connections < options.limits.max_connections) {
+    limits.max_client_connections = static_cast<uint32_t>(
+        std::max(uint64_t{1}, uint64_t{limits.max_client_connections} * limits.max_connections /
+                                  options.limits.max_connections));
     Log(LogLevel::kWarn, "fewer_connections",
         {{"max", limits.max_connections},
          {"message", "than --max-connections, for want of open files"}});
@@ -136,7 +148,7 @@ int Run(const Options& options, std::vector<ListeningSocket> inherited, const si
   if (!options.cache_dir.empty()) {
     auto opened = ParticleFiles::Open(options.cache_dir, limits);
     if (!opened.ok()) {
-      return Fail(kExitCannotStart, Prefixed("--cache-dir ", opened.status()));
+      return fail(kExitCannotStart, Prefixed("--cache-dir ", opened.status()));
     }
     files = *std::move(opened);
   }
@@ -152,11 +164,11 @@ int Run(const Options& options, std::vector<ListeningSocket> inherited, const si
   auto server =
       GrpcServer::Start(*std::move(sockets), **access, backend, {.channelz = options.channelz});
   if (!server.ok()) {
-    return Fail(kExitCannotStart, server.status());
+    return fail(kExitCannotStart, server.status());
   }
   auto shown = ShowMetrics(*std::move(metrics_sockets), counted, {**engine, backend, **server});
   if (!shown.ok()) {
-    return Fail(kExitCannotStart, shown.status());
+    return fail(kExitCannotStart, shown.status());
   }
   watch.reset();  // from now on a signal is a drain's
   for (const std::string& address : (*server)->addresses()) {
@@ -197,8 +209,10 @@ int main(int argc, char** argv) {
     return EXIT_SUCCESS;
   }
   KeepFreedMemory();
-  // A file that may not grow is an error of the write, not the end of the server.
+  // A file that may not grow, and a log that nobody reads any more, are errors of the write, not
+  // the end of the server.
   signal(SIGXFSZ, SIG_IGN);
+  signal(SIGPIPE, SIG_IGN);
   auto inherited = TakeInheritedSockets();
   if (!inherited.ok()) {
     return Fail(kExitCannotStart, inherited.status());

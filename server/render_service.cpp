@@ -107,7 +107,7 @@ grpc::Service& RenderService::grpc_service() { return *calls_; }
 
 void RenderService::BeginDrain() { calls_->BeginDrain(); }
 
-int RenderService::active_calls() const { return calls_->count().active; }
+int RenderService::served_calls() const { return calls_->count().served; }
 
 int RenderService::active_calls(Rpc rpc) const {
   return calls_->count().active_of[static_cast<size_t>(rpc)];

@@ -34,7 +34,7 @@ class RenderService {
   // under way go on.
   void BeginDrain();
   // Calls under way.
-  [[nodiscard]] int active_calls() const;
+  [[nodiscard]] int served_calls() const;
   [[nodiscard]] int active_calls(Rpc rpc) const;
   // All that ever began.
   [[nodiscard]] uint64_t calls_begun() const;

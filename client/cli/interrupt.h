@@ -1,6 +1,6 @@
 // Turns SIGINT, SIGTERM and SIGHUP into a stop request, so that a command unwinds: calls are
 // cancelled, files removed, the server ended. A second signal ends the process at once. One that
-// the process was told to ignore does nothing. Leaves out SIGPIPE, which gRPC ignores by itself.
+// the process was told to ignore does nothing. Leaves SIGPIPE alone, which the commands ignore.
 #pragma once
 
 #include <atomic>

@@ -38,6 +38,7 @@ v1::GetServerInfoResponse GetServerInfo(const Backend& backend) {
   told.set_partial_upload_seconds(limits.partial_upload_seconds);
   told.set_max_cache_dir_bytes(limits.max_cache_dir_bytes);
   told.set_max_connections(limits.max_connections);
+  told.set_max_client_connections(limits.max_client_connections);
   told.set_max_connection_streams(limits.max_connection_streams);
   told.set_max_handshake_seconds(limits.max_handshake_seconds);
   told.set_max_idle_seconds(limits.max_idle_seconds);

@@ -19,6 +19,8 @@
 #include <unistd.h>
 
 #include "server/log/log.h"
+#include "server/log/log_budget.h"
+#include "server/machine.h"
 
 namespace halflight {
 namespace {
@@ -68,38 +70,31 @@ class Reserve {
   int fd_ = -1;
 };
 
-// What goes wrong with every client is told at once, then counted.
+// What goes wrong with every client is told at once, then counted. Any thread.
 class Complaint {
  public:
   void Count(const char* why) {
-    constexpr std::chrono::seconds kQuiet{10};
     ++refused_;
-    const auto now = std::chrono::steady_clock::now();
-    if (!told_.has_value() || now - *told_ >= kQuiet) {
-      Log(LogLevel::kWarn, "connections_refused",
-          {{"message", why}, {"since_last_told", refused_ - refused_told_}});
-      refused_told_ = refused_;
-      told_ = now;
+    if (const auto count = budget_.Take()) {
+      Log(LogLevel::kWarn, "connections_refused", {{"message", why}, {"since_last_told", *count}});
     }
   }
-  // Any thread.
   [[nodiscard]] uint64_t refused() const { return refused_; }
 
  private:
   std::atomic<uint64_t> refused_ = 0;
-  uint64_t refused_told_ = 0;
-  std::optional<std::chrono::steady_clock::time_point> told_;
+  LogBudget budget_{1};
 };
 
 }  // namespace
 
 class Acceptor::Loop {
  public:
-  Loop(std::vector<ListeningSocket> sockets, Connections& connections, uint32_t max_connections,
-       Serve serve)
+  Loop(std::vector<ListeningSocket> sockets, Connections& connections,
+       const ConnectionLimits& limits, Serve serve)
       : sockets_(std::move(sockets)),
         connections_(connections),
-        max_connections_(max_connections),
+        limits_(limits),
         serve_(std::move(serve)),
         wake_(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {}
   ~Loop() { close(wake_); }
@@ -158,9 +153,12 @@ class Acceptor::Loop {
   // False where it is of no use to try again at once.
   bool AcceptAll(int listening) {
     for (int i = 0; i < kBatch; ++i) {
-      const int fd = accept4(listening, nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC);
+      sockaddr_storage peer{};
+      socklen_t length = sizeof(peer);
+      auto& address = reinterpret_cast<sockaddr&>(peer);
+      const int fd = accept4(listening, &address, &length, SOCK_NONBLOCK | SOCK_CLOEXEC);
       if (fd >= 0) {
-        Take(fd);
+        Take(fd, MachineOf(address));
         continue;
       }
       switch (errno) {
@@ -192,10 +190,13 @@ class Acceptor::Loop {
     return true;
   }
 
-  void Take(int fd) {
-    if (!connections_.Add(fd, max_connections_)) {
+  void Take(int fd, const std::string& machine) {
+    const Connections::Addition addition = connections_.Add(fd, machine, limits_);
+    if (addition != Connections::Addition::kDone) {
       close(fd);
-      complaint_.Count("max_connections are open");
+      complaint_.Count(addition == Connections::Addition::kFull
+                           ? "max_connections are open"
+                           : "max_client_connections of one machine are open");
       return;
     }
     WatchPeer(fd);
@@ -219,7 +220,7 @@ class Acceptor::Loop {
 
   std::vector<ListeningSocket> sockets_;
   Connections& connections_;
-  const uint32_t max_connections_;
+  const ConnectionLimits limits_;
   const Serve serve_;
   const int wake_;
   Reserve reserve_;
@@ -228,9 +229,9 @@ class Acceptor::Loop {
 
 absl::StatusOr<std::unique_ptr<Acceptor>> Acceptor::Start(std::vector<ListeningSocket> sockets,
                                                           Connections& connections,
-                                                          uint32_t max_connections, Serve serve) {
-  auto loop =
-      std::make_unique<Loop>(std::move(sockets), connections, max_connections, std::move(serve));
+                                                          const ConnectionLimits& limits,
+                                                          Serve serve) {
+  auto loop = std::make_unique<Loop>(std::move(sockets), connections, limits, std::move(serve));
   if (absl::Status status = loop->Listen(); !status.ok()) {
     return status;
   }

@@ -28,13 +28,14 @@ class Acceptor {
   // Takes over a connected socket that does not block; the acceptor's thread.
   using Serve = std::function<void(int fd)>;
 
-  // Listens on all sockets. With `max_connections` open, or without a descriptor left, a client
+  // Listens on all sockets. With so many connections open, or without a descriptor left, a client
   // that connects is disconnected at once, which gRPC reports as UNAVAILABLE: it can try elsewhere
   // or later. Left waiting it would seem to be connected, and hang until its deadline. Unavailable
   // where a socket cannot listen. `connections` outlive the acceptor.
   static absl::StatusOr<std::unique_ptr<Acceptor>> Start(std::vector<ListeningSocket> sockets,
                                                          Connections& connections,
-                                                         uint32_t max_connections, Serve serve);
+                                                         const ConnectionLimits& limits,
+                                                         Serve serve);
   // Stops.
   ~Acceptor();
   Acceptor(const Acceptor&) = delete;

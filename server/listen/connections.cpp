@@ -1,6 +1,8 @@
 #include "server/listen/connections.h"
 
+#include <algorithm>
 #include <utility>
+#include <vector>
 
 #include <linux/sockios.h>
 #include <linux/tcp.h>
@@ -22,17 +24,28 @@ uint64_t CookieOf(int fd) {
 
 }  // namespace
 
-bool Connections::Add(int fd, size_t limit) {
+Connections::Addition Connections::Add(int fd, const std::string& machine,
+                                       const ConnectionLimits& limits) {
   const std::lock_guard lock(mutex_);
-  if (open_.size() >= limit && Clock::now() - looked_ >= kLookAgain) {
+  Addition addition = RoomFor(machine, limits);
+  if (addition != Addition::kDone && Clock::now() - looked_ >= kLookAgain) {
     ForgetClosed();
+    addition = RoomFor(machine, limits);
   }
-  if (open_.size() >= limit) {
-    return false;
+  if (addition == Addition::kDone) {
+    Forget(fd);  // closed, and the descriptor is another's now
+    open_[fd] = {.cookie = CookieOf(fd), .machine = machine, .patience = {}};
+    machines_.Add(machine);
+    ++added_;
   }
-  open_[fd] = {.cookie = CookieOf(fd), .patience = {}};
-  ++added_;
-  return true;
+  return addition;
+}
+
+Connections::Addition Connections::RoomFor(const std::string& machine,
+                                           const ConnectionLimits& limits) const {
+  return open_.size() >= limits.all                    ? Addition::kFull
+         : machines_.Of(machine) >= limits.one_machine ? Addition::kMachineFull
+                                                       : Addition::kDone;
 }
 
 size_t Connections::Count() {
@@ -46,9 +59,21 @@ uint64_t Connections::added() const {
   return added_;
 }
 
+void Connections::Forget(int fd) {
+  if (const auto closed = open_.find(fd); closed != open_.end()) {
+    machines_.Remove(closed->second.machine);
+    open_.erase(closed);
+  }
+}
+
 void Connections::ForgetClosed() {
-  std::erase_if(open_,
-                [](const auto& entry) { return CookieOf(entry.first) != entry.second.cookie; });
+  std::vector<int> closed;
+  for (const auto& [fd, connection] : open_) {
+    if (CookieOf(fd) != connection.cookie) {
+      closed.push_back(fd);
+    }
+  }
+  std::for_each(closed.begin(), closed.end(), [this](int fd) { Forget(fd); });
   looked_ = Clock::now();
 }
 
@@ -70,10 +95,10 @@ void Connections::CutOffStalled(const PatienceLimits& limits, std::chrono::milli
   const auto waited = looked_ - std::exchange(looked_for_stalled_, looked_);
   for (auto& [fd, connection] : open_) {
     const Backlog before = std::exchange(connection.backlog, BacklogOf(fd));
-    const auto& [unread, taken] = connection.backlog;
+    const auto& [unread, full, taken] = connection.backlog;
+    const bool progress = taken.has_value() ? taken != before.taken : unread != before.unread;
     auto& patience = connection.patience;
-    if (!patience.has_value() || waited > 3 * apart || unread == 0 ||
-        (!taken.has_value() && unread != before.unread)) {
+    if (!patience.has_value() || waited > 3 * apart || unread == 0 || (progress && !full)) {
       patience = Patience(limits);
       continue;
     }
@@ -91,6 +116,7 @@ Connections::Backlog Connections::BacklogOf(int fd) {
   socklen_t length = sizeof(info);
   if (getsockopt(fd, IPPROTO_TCP, TCP_INFO, &info, &length) == 0) {
     backlog.taken = info.tcpi_bytes_acked;
+    backlog.full = info.tcpi_notsent_bytes > 0;
   }
   return backlog;
 }

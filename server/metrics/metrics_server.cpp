@@ -95,11 +95,16 @@ class Server final : public MetricsServer {
 
   absl::Status Listen(std::vector<ListeningSocket> sockets) {
     auto acceptor =
-        Acceptor::Start(std::move(sockets), connections_, kMaxConnections, [this](int fd) {
-          // Tasks can be copied, descriptors that close themselves cannot.
-          workers_.Post(
-              [this, kept = std::make_shared<FileDescriptor>(fd)] { Serve(kept->get()); });
-        });
+        Acceptor::Start(std::move(sockets), connections_,
+                        {.all = kMaxConnections, .one_machine = kMaxConnections}, [this](int fd) {
+                          // From now on, so that who says nothing keeps those behind it waiting no
+                          // longer than itself.
+                          const auto until = Clock::now() + patience_;
+                          // Tasks can be copied, descriptors that close themselves cannot.
+                          workers_.Post([this, until, kept = std::make_shared<FileDescriptor>(fd)] {
+                            Serve(kept->get(), until);
+                          });
+                        });
     if (!acceptor.ok()) {
       return acceptor.status();
     }
@@ -108,8 +113,7 @@ class Server final : public MetricsServer {
   }
 
  private:
-  void Serve(int fd) {
-    const auto until = Clock::now() + patience_;
+  void Serve(int fd, Clock::time_point until) {
     if (const std::string head = ReadHead(fd, until); !head.empty()) {
       Send(fd, AnswerTo(head, page_), until);
     }

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <mutex>
 #include <sstream>
 #include <string>
 #include <system_error>
@@ -41,6 +42,22 @@ double StartTime(double seconds_after_boot) {
   return start;
 }
 
+// Of glibc's allocator, which looks at all that is free, and allocates nothing meanwhile: not for
+// whoever asks again and again.
+double HeapBytes() {
+  constexpr double kOld = 1.0;  // seconds
+  static std::mutex mutex;
+  static double looked = -kOld;
+  static double bytes = 0.0;
+  const std::lock_guard lock(mutex);
+  if (const double now = Now(CLOCK_MONOTONIC); now - looked >= kOld) {
+    const struct mallinfo2 heap = mallinfo2();
+    bytes = static_cast<double>(heap.uordblks + heap.hblkhd);
+    looked = now;
+  }
+  return bytes;
+}
+
 }  // namespace
 
 std::vector<prometheus::MetricFamily> ProcessState() {
@@ -62,10 +79,8 @@ std::vector<prometheus::MetricFamily> ProcessState() {
     state.push_back(GaugeOf("process_resident_memory_bytes", "Memory in RAM",
                             {{.value = number(24) * static_cast<double>(sysconf(_SC_PAGESIZE))}}));
   }
-  // Of glibc's allocator. What grows while this does not is what lies between allocations.
-  const struct mallinfo2 heap = mallinfo2();
-  state.push_back(GaugeOf("process_heap_bytes", "Memory allocated and not freed",
-                          {{.value = static_cast<double>(heap.uordblks + heap.hblkhd)}}));
+  state.push_back(
+      GaugeOf("process_heap_bytes", "Memory allocated and not freed", {{.value = HeapBytes()}}));
   std::error_code error;
   if (const std::filesystem::directory_iterator open("/proc/self/fd", error); !error) {
     state.push_back(

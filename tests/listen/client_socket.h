@@ -8,21 +8,31 @@
 #include <netinet/in.h>
 #include <poll.h>
 #include <sys/socket.h>
+#include <sys/un.h>
 #include <unistd.h>
 
 namespace halflight::testing {
 
 class ClientSocket {
  public:
-  ClientSocket() : fd_(socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)) {}
+  // AF_INET or AF_UNIX.
+  explicit ClientSocket(int family = AF_INET)
+      : fd_(socket(family, SOCK_STREAM | SOCK_CLOEXEC, 0)) {}
   ~ClientSocket() { Close(); }
   ClientSocket(ClientSocket&& other) noexcept : fd_(other.fd_) { other.fd_ = -1; }
   ClientSocket& operator=(ClientSocket&&) = delete;
   ClientSocket(const ClientSocket&) = delete;
   ClientSocket& operator=(const ClientSocket&) = delete;
 
-  // "127.0.0.1:port". The kernel connects as long as the backlog has room.
+  // "127.0.0.1:port" or "unix:path", as its family is. The kernel connects as long as the backlog
+  // has room.
   bool Connect(const std::string& address) const {
+    if (address.rfind("unix:", 0) == 0) {
+      sockaddr_un path{};
+      path.sun_family = AF_UNIX;
+      address.copy(path.sun_path, sizeof(path.sun_path) - 1, 5);
+      return connect(fd_, reinterpret_cast<const sockaddr*>(&path), sizeof(path)) == 0;
+    }
     sockaddr_in name{};
     name.sin_family = AF_INET;
     name.sin_addr.s_addr = htonl(INADDR_LOOPBACK);

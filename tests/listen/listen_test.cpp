@@ -73,7 +73,8 @@ class AcceptorTest : public ::testing::Test {
     auto sockets = ListeningSocket::Bind("127.0.0.1:0");
     ASSERT_TRUE(sockets.ok()) << sockets.status();
     address_ = sockets->front().address();
-    auto acceptor = Acceptor::Start(*std::move(sockets), connections_, max_connections,
+    auto acceptor = Acceptor::Start(*std::move(sockets), connections_,
+                                    {.all = max_connections, .one_machine = max_connections},
                                     [this](int fd) { served_.Take(fd); });
     ASSERT_TRUE(acceptor.ok()) << acceptor.status();
     acceptor_ = *std::move(acceptor);
@@ -95,8 +96,9 @@ TEST_F(AcceptorTest, HandsOverSocketsThatDoNotBlockNorStayInChildren) {
   auto sockets = ListeningSocket::Bind("127.0.0.1:0");
   ASSERT_TRUE(sockets.ok());
   const std::string address = sockets->front().address();
-  const auto acceptor = Acceptor::Start(*std::move(sockets), connections_, 10,
-                                        [&accepted](int fd) { accepted = fd; });
+  const auto acceptor =
+      Acceptor::Start(*std::move(sockets), connections_, {.all = 10, .one_machine = 10},
+                      [&accepted](int fd) { accepted = fd; });
   ASSERT_TRUE(acceptor.ok());
   ClientSocket client;
   ASSERT_TRUE(client.Connect(address));
@@ -200,14 +202,17 @@ TEST_F(AcceptorTest, HangingUpDoesNotWaitForEver) {
   EXPECT_EQ(served_.size(), 1U);
 }
 
+using Addition = Connections::Addition;
+
 TEST(Connections, CountWhatIsOpenWhoeverHasTheDescriptorsNow) {
+  constexpr ConnectionLimits kLimits{.all = 3, .one_machine = 3};
   Connections connections;
   std::vector<ClientSocket> sockets(3);
   for (const ClientSocket& socket : sockets) {
-    EXPECT_TRUE(connections.Add(socket.fd(), 3));
+    EXPECT_EQ(connections.Add(socket.fd(), "a", kLimits), Addition::kDone);
   }
   EXPECT_EQ(connections.Count(), 3U);
-  EXPECT_FALSE(connections.Add(STDIN_FILENO, 3));
+  EXPECT_EQ(connections.Add(STDIN_FILENO, "a", kLimits), Addition::kFull);
   // Another socket, and something that is none, under the same numbers.
   const int first = sockets[0].fd();
   const int second = sockets[1].fd();
@@ -219,7 +224,24 @@ TEST(Connections, CountWhatIsOpenWhoeverHasTheDescriptorsNow) {
   EXPECT_EQ(connections.Count(), 0U);
 }
 
+TEST(Connections, OfOneMachineLeaveRoomToOthers) {
+  constexpr ConnectionLimits kLimits{.all = 3, .one_machine = 2};
+  Connections connections;
+  std::vector<ClientSocket> sockets(5);
+  EXPECT_EQ(connections.Add(sockets[0].fd(), "a", kLimits), Addition::kDone);
+  EXPECT_EQ(connections.Add(sockets[1].fd(), "a", kLimits), Addition::kDone);
+  EXPECT_EQ(connections.Add(sockets[2].fd(), "a", kLimits), Addition::kMachineFull);
+  EXPECT_EQ(connections.Add(sockets[3].fd(), "b", kLimits), Addition::kDone);
+  EXPECT_EQ(connections.Add(sockets[4].fd(), "c", kLimits), Addition::kFull);
+  sockets[0].Close();
+  EXPECT_TRUE(WaitFor([&] {
+    return connections.Add(sockets[2].fd(), "a", kLimits) == Addition::kDone;
+  })) << "counts what it looked at a moment ago";
+}
+
 using std::chrono::milliseconds;
+
+constexpr ConnectionLimits kRoom{.all = 10, .one_machine = 10};
 
 // Two ends of a connection, of which ours does not block.
 struct SocketPair {
@@ -251,7 +273,7 @@ TEST(Connections, OfThoseThatTakeNothingAreCutOff) {
   const SocketPair idle;
   Connections connections;
   for (const SocketPair* pair : {&stopped, &slow, &idle}) {
-    ASSERT_TRUE(connections.Add(pair->ours, 10));
+    ASSERT_EQ(connections.Add(pair->ours, "a", kRoom), Addition::kDone);
   }
   std::string part(10000, 'x');
   const auto size = static_cast<ssize_t>(part.size());
@@ -300,8 +322,7 @@ TEST(Connections, OfThoseThatTakeSomethingStayWhateverIsLeftUnlessItIsTooLittle)
     return unread > 0 && unread == was;
   }));
   const int before = unread;
-  const auto take_and_send = [&](Connections& connections, const PatienceLimits& limits) {
-    connections.CutOffStalled(limits, std::chrono::minutes(1));
+  const auto take_and_send = [&] {
     std::this_thread::sleep_for(milliseconds(30));
     ASSERT_TRUE(WaitFor([&] {
       EXPECT_GE(recv(client.fd(), bytes.data(), 64, MSG_DONTWAIT), -1);
@@ -312,12 +333,14 @@ TEST(Connections, OfThoseThatTakeSomethingStayWhateverIsLeftUnlessItIsTooLittle)
       ASSERT_GT(send(ours.get(), bytes.data(), std::min(missing, bytes.size()), MSG_NOSIGNAL), 0);
     }
     ASSERT_EQ(UnreadOf(ours.get()), before);
-    connections.CutOffStalled(limits, std::chrono::minutes(1));
   };
   Connections lenient;
-  ASSERT_TRUE(lenient.Add(ours.get(), 1));
+  ASSERT_EQ(lenient.Add(ours.get(), "a", kRoom), Addition::kDone);
+  PatienceLimits limits{.at_once = milliseconds(20)};
+  lenient.CutOffStalled(limits, std::chrono::minutes(1));
   for (int i = 0; i < 3; ++i) {
-    ASSERT_NO_FATAL_FAILURE(take_and_send(lenient, {.at_once = milliseconds(20)}));
+    ASSERT_NO_FATAL_FAILURE(take_and_send());
+    lenient.CutOffStalled(limits, std::chrono::minutes(1));
   }
   EXPECT_EQ(send(ours.get(), "x", 1, MSG_NOSIGNAL), 1);
   ASSERT_TRUE(WaitFor([&] {
@@ -325,9 +348,11 @@ TEST(Connections, OfThoseThatTakeSomethingStayWhateverIsLeftUnlessItIsTooLittle)
     return UnreadOf(ours.get()) <= before;
   }));
   Connections strict;
-  ASSERT_TRUE(strict.Add(ours.get(), 1));
-  ASSERT_NO_FATAL_FAILURE(
-      take_and_send(strict, {.at_once = milliseconds(20), .bytes_per_second = 1'000'000'000}));
+  ASSERT_EQ(strict.Add(ours.get(), "a", kRoom), Addition::kDone);
+  limits.bytes_per_second = 1'000'000'000;
+  strict.CutOffStalled(limits, std::chrono::minutes(1));
+  ASSERT_NO_FATAL_FAILURE(take_and_send());
+  strict.CutOffStalled(limits, std::chrono::minutes(1));
   EXPECT_EQ(send(ours.get(), "x", 1, MSG_NOSIGNAL), -1);
 }
 

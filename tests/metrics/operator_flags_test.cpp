@@ -19,6 +19,7 @@ using ::testing::HasSubstr;
 using testing::NewChannel;
 using ::testing::Not;
 using testing::Process;
+using ::testing::StartsWith;
 
 constexpr const char* kGetServers = "/grpc.channelz.v1.Channelz/GetServers";
 
@@ -43,6 +44,14 @@ TEST(MetricsFlags, ErrorsAreToldAtStart) {
     EXPECT_THAT(server.Err(), HasSubstr(wrong.text));
     EXPECT_THAT(server.Err(), Not(HasSubstr("listening")));
   }
+}
+
+TEST(LogFlags, WhyItDoesNotStartIsALineLikeAnyOther) {
+  const Folder folder;
+  Process server(folder, "halflightd_fake", {"--address", "0.0.0.0:0", "--log-format", "json"});
+  EXPECT_EQ(server.Wait(), 2);
+  EXPECT_THAT(server.Err(), HasSubstr(R"("level":"error","event":"cannot_start","message":")"));
+  EXPECT_THAT(server.Err(), StartsWith("{"));
 }
 
 TEST(MetricsFlags, OthersMayReadThemOnlyWhenToldAndThenLoudly) {

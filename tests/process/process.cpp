@@ -66,7 +66,7 @@ Process::Process(const Folder& folder, const std::string& program,
   if (pid_ == 0) {
     constexpr int kFlags = O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC;
     dup2(open(out.c_str(), kFlags, 0600), STDOUT_FILENO);
-    dup2(open(err.c_str(), kFlags, 0600), STDERR_FILENO);
+    dup2(options.err >= 0 ? options.err : open(err.c_str(), kFlags, 0600), STDERR_FILENO);
     for (size_t i = 0; i < options.sockets.size(); ++i) {
       dup2(options.sockets[i], static_cast<int>(3 + i));
     }

@@ -30,6 +30,7 @@ struct ProcessOptions {
   std::vector<std::string> environment{};  // "NAME=value", beside TMPDIR
   // Handed over as a service manager does: descriptors from 3 on, with LISTEN_FDS and LISTEN_PID.
   std::vector<int> sockets{};
+  int err = -1;  // where its stderr goes instead
 };
 
 // One program that runs. Its TMPDIR is `folder`/tmp, and all that it prints is kept there too.

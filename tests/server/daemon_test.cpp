@@ -7,6 +7,7 @@
 #include <string>
 #include <thread>
 
+#include <fcntl.h>
 #include <sys/socket.h>
 #include <sys/un.h>
 #include <unistd.h>
@@ -50,6 +51,24 @@ class Daemon : public ::testing::Test {
 
   const testing::Folder folder_;
 };
+
+TEST_F(Daemon, LivesOnWhereNobodyReadsItsLogAnyMore) {
+  int log[2];
+  ASSERT_EQ(pipe2(log, O_CLOEXEC), 0);
+  const std::string socket = Path("socket");
+  testing::ProcessOptions options;
+  options.err = log[1];
+  Process server(folder_, "halflightd_fake", {"--address", "unix:" + socket}, options);
+  close(log[1]);
+  ASSERT_TRUE(WaitFor([&] { return fs::exists(socket); }));
+  close(log[0]);
+  const auto stub = Connect("unix:" + socket);
+  for (int i = 0; i < 3; ++i) {
+    EXPECT_TRUE(Render(*stub).ok());
+  }
+  server.Signal(SIGTERM);
+  EXPECT_EQ(server.Wait(), 0);
+}
 
 TEST_F(Daemon, FinishesWhatRunsOnSigtermAndExitsWell) {
   std::ofstream(Path("hold")) << "";

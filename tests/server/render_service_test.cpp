@@ -2,6 +2,7 @@
 
 #include "server/render_service.h"
 
+#include <atomic>
 #include <memory>
 #include <string>
 #include <thread>
@@ -210,8 +211,10 @@ TEST_F(StrictService, UploadThatSendsTooLittleLosesItsCallHoweverSteady) {
   const auto writer = stub_->UploadParticles(&context, &response);
   const auto header =
       testing::Header(testing::Describe(MakeParticles(1000, {v1::PARTICLE_ATTRIBUTE_POSITION})));
-  for (bool wrote = writer->Write(header); wrote; wrote = writer->Write(testing::Chunk("x"))) {
+  bool goes_on = writer->Write(header);
+  for (int i = 0; i < 100 && goes_on; ++i) {
     std::this_thread::sleep_for(std::chrono::milliseconds(200));
+    goes_on = writer->Write(testing::Chunk("x"));
   }
   EXPECT_EQ(writer->Finish().error_code(), grpc::StatusCode::CANCELLED);
 }
@@ -254,6 +257,29 @@ TEST_F(ImpatientService, CallsBeyondTheLimitAreToldToComeBack) {
   EXPECT_THAT(status.error_details(), HasSubstr("TOO_MANY_CALLS"));
   EXPECT_EQ(context.GetServerTrailingMetadata().count("grpc-retry-pushback-ms"), 1U);
   engine_.SetGate(true);
+}
+
+class NarrowService : public Service {
+ protected:
+  NarrowService() : Service({.max_connection_streams = 2}) {}
+};
+
+TEST_F(NarrowService, CallsOfOneConnectionBeyondTheLimitWaitForOthersToEnd) {
+  engine_.SetGate(false);
+  std::vector<std::jthread> clients;
+  for (int i = 0; i < 2; ++i) {
+    clients.emplace_back([this] { EXPECT_TRUE(RenderAll(MakeRequest()).ok()); });
+  }
+  ASSERT_TRUE(WaitFor([this] { return pipeline_.queued() == 2; }));
+  const auto ask = [this](std::chrono::milliseconds time) {
+    grpc::ClientContext context;
+    context.set_deadline(std::chrono::system_clock::now() + time);
+    v1::GetServerInfoResponse info;
+    return stub_->GetServerInfo(&context, {}, &info).error_code();
+  };
+  EXPECT_EQ(ask(std::chrono::milliseconds(200)), grpc::StatusCode::DEADLINE_EXCEEDED);
+  engine_.SetGate(true);
+  EXPECT_EQ(ask(std::chrono::seconds(30)), grpc::StatusCode::OK);
 }
 
 TEST_F(Service, ErrorCarriesItsFieldForPrograms) {
@@ -475,6 +501,29 @@ TEST_F(Service, DrainFinishesWhatRunsAndRefusesTheRest) {
   engine_.SetGate(true);
   running.join();
   EXPECT_TRUE(WaitFor([this] { return server_->idle(); }));
+}
+
+TEST_F(Service, CallsThatADrainRefusesDoNotHoldItUp) {
+  ASSERT_TRUE(RenderAll(MakeRequest()).ok());  // so that there is a connection
+  ASSERT_TRUE(WaitFor([this] { return server_->idle(); }));
+  server_->BeginDrain();
+  std::atomic<int> refused = 0;
+  std::vector<std::jthread> clients;
+  for (int i = 0; i < 16; ++i) {
+    clients.emplace_back([&](const std::stop_token& stop) {
+      while (!stop.stop_requested()) {
+        refused += RenderAll(MakeRequest()).error_code() == grpc::StatusCode::UNAVAILABLE ? 1 : 0;
+      }
+    });
+  }
+  int looks = 0;
+  int busy = 0;
+  while (refused < 2000) {
+    ++looks;
+    busy += server_->idle() ? 0 : 1;
+    std::this_thread::sleep_for(std::chrono::microseconds(100));
+  }
+  EXPECT_LT(busy, looks / 4) << "while one is refused, and not until its peer knows";
 }
 
 TEST_F(Service, SecondServerOnTheSamePortIsRefused) {

@@ -3,13 +3,8 @@
 
 #include <sys/ioctl.h>
 #include <sys/socket.h>
-#include <sys/un.h>
-#include <unistd.h>
-
-#include <netinet/in.h>
 
 #include <chrono>
-#include <cstdlib>
 #include <memory>
 #include <string>
 #include <thread>
@@ -18,6 +13,7 @@
 #include <gtest/gtest.h>
 
 #include "server/grpc_server.h"
+#include "tests/listen/client_socket.h"
 #include "tests/process/process.h"
 #include "tests/process/wait_for.h"
 #include "tests/server/fake_engine.h"
@@ -25,6 +21,7 @@
 namespace halflight {
 namespace {
 
+using testing::ClientSocket;
 using testing::EncodePlain;
 using testing::FakeEngine;
 using testing::MakeRequest;
@@ -70,46 +67,11 @@ std::string CallWith(const std::string& rpc, const std::string& message) {
          Frame(kData, kEndStream, 1, BigEndian(0, 1) + BigEndian(message.size(), 4) + message);
 }
 
-// A socket that is connected to "127.0.0.1:port" or "unix:path", with little room to receive in.
-class SmallSocket {
- public:
-  explicit SmallSocket(const std::string& address)
-      : local_(address.rfind("unix:", 0) == 0),
-        fd_(socket(local_ ? AF_UNIX : AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
-    const int room = 65536;
-    setsockopt(fd_, SOL_SOCKET, SO_RCVBUF, &room, sizeof(room));
-    sockaddr_un path{};
-    path.sun_family = AF_UNIX;
-    address.copy(path.sun_path, sizeof(path.sun_path) - 1, 5);
-    sockaddr_in place{};
-    place.sin_family = AF_INET;
-    place.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    place.sin_port =
-        htons(static_cast<uint16_t>(std::atoi(address.substr(address.rfind(':') + 1).c_str())));
-    EXPECT_EQ(local_ ? connect(fd_, reinterpret_cast<const sockaddr*>(&path), sizeof(path))
-                     : connect(fd_, reinterpret_cast<const sockaddr*>(&place), sizeof(place)),
-              0);
-  }
-  ~SmallSocket() { close(fd_); }
-  SmallSocket(const SmallSocket&) = delete;
-  SmallSocket& operator=(const SmallSocket&) = delete;
-  SmallSocket(SmallSocket&&) = delete;
-  SmallSocket& operator=(SmallSocket&&) = delete;
-
-  [[nodiscard]] int Unread() const {
-    int bytes = 0;
-    ioctl(fd_, FIONREAD, &bytes);
-    return bytes;
-  }
-  void Send(const std::string& bytes) const {
-    EXPECT_EQ(send(fd_, bytes.data(), bytes.size(), MSG_NOSIGNAL),
-              static_cast<ssize_t>(bytes.size()));
-  }
-
- private:
-  const bool local_;
-  const int fd_;
-};
+int UnreadBytes(const ClientSocket& client) {
+  int bytes = 0;
+  ioctl(client.fd(), FIONREAD, &bytes);
+  return bytes;
+}
 
 class UnreadCall : public ::testing::TestWithParam<bool> {
  protected:
@@ -128,6 +90,15 @@ class UnreadCall : public ::testing::TestWithParam<bool> {
     return request;
   }
 
+  // Connected, with little room to receive in.
+  [[nodiscard]] ClientSocket Connect() const {
+    ClientSocket client(GetParam() ? AF_UNIX : AF_INET);
+    const int room = 65536;
+    setsockopt(client.fd(), SOL_SOCKET, SO_RCVBUF, &room, sizeof(room));
+    EXPECT_TRUE(client.Connect(server_->addresses()[0]));
+    return client;
+  }
+
   const testing::Folder folder_;
   const ServerLimits limits_;
   const std::string version_ = "1";
@@ -141,8 +112,8 @@ class UnreadCall : public ::testing::TestWithParam<bool> {
 };
 
 TEST_P(UnreadCall, EndsWithItsConnectionWhereTheSocketIsFull) {
-  const SmallSocket client(server_->addresses()[0]);
-  client.Send(CallWith("RenderFrame", LargeRequest().SerializeAsString()));
+  const ClientSocket client = Connect();
+  ASSERT_TRUE(client.Send(CallWith("RenderFrame", LargeRequest().SerializeAsString())));
   ASSERT_TRUE(WaitFor([&] { return engine_.rendered() == 1; }));
   EXPECT_FALSE(server_->idle());
   EXPECT_TRUE(WaitFor([&] { return server_->idle(); })) << "the call waits for its reader";
@@ -156,9 +127,9 @@ class UnreadPatientCall : public UnreadCall {
 };
 
 TEST_P(UnreadPatientCall, DoesNotHoldUpTheEndOfTheServer) {
-  const SmallSocket client(server_->addresses()[0]);
-  client.Send(CallWith("RenderFrame", LargeRequest().SerializeAsString()));
-  ASSERT_TRUE(WaitFor([&] { return client.Unread() > 32768; }));
+  const ClientSocket client = Connect();
+  ASSERT_TRUE(client.Send(CallWith("RenderFrame", LargeRequest().SerializeAsString())));
+  ASSERT_TRUE(WaitFor([&] { return UnreadBytes(client) > 32768; }));
   std::this_thread::sleep_for(std::chrono::milliseconds(200));  // until nothing fits any more
   server_.reset();
   EXPECT_TRUE(WaitFor([&] { return pipeline_.memory_bytes() == 0; }));
