@@ -72,7 +72,6 @@ CallToken::CallToken(Rpc rpc, CallCount& count, const Backend& backend, const Ac
   context.AddInitialMetadata(kRequestIdKey, caller_.call_id);
   ++count_.begun;
   ++count_.active_of[static_cast<size_t>(rpc)];
-  ++count_.active;
   ++count_.served;
   refusal_ = Enter(access, backend.limits);
   entered_ = refusal_.ok();
@@ -102,7 +101,6 @@ CallToken::~CallToken() {
   }
   count_.stalled -= stalled_ ? 1 : 0;
   --count_.active_of[static_cast<size_t>(rpc_)];
-  --count_.active;
 }
 
 Cancellation CallToken::EndedBy() const {
@@ -119,7 +117,9 @@ Cancellation CallToken::EndedBy() const {
 void CallToken::WriteLog(const absl::Status& outcome, Cancellation by) const {
   LogFields fields = {{"rpc", NameOf(rpc_)}, {"request_id", caller_.call_id}};
   // Whoever is refused can call again at once, and for ever.
-  const auto refused = entered_ ? std::nullopt : count_.refusals_told.Take();
+  LogBudget& budget =
+      absl::IsUnauthenticated(outcome) ? count_.strangers_told : count_.refusals_told;
+  const auto refused = entered_ ? std::nullopt : budget.Take();
   if (refused.has_value()) {
     fields.emplace_back("since_last_told", *refused);
   }

@@ -24,11 +24,11 @@ namespace halflight {
 
 // How many calls are under way, and whether more may come.
 struct CallCount {
-  std::atomic<int> active = 0;
-  std::atomic<int> served = 0;  // of the active: those that were not refused, or not yet
+  std::atomic<int> served = 0;  // all but those that were refused
   std::array<std::atomic<int>, kRpcs> active_of{};
-  std::atomic<int> stalled = 0;  // of the active: those that should have ended for it
+  std::atomic<int> stalled = 0;  // those that should have ended for it
   std::atomic<uint64_t> begun = 0;
+  LogBudget strangers_told{20};  // lines of calls that were refused
   LogBudget refusals_told{20};
   std::atomic<bool> draining = false;
 
@@ -38,7 +38,7 @@ struct CallCount {
 
  private:
   std::mutex mutex_;
-  ClientCounts entered_;  // of those that are active: who is refused takes nobody's place
+  ClientCounts entered_;  // those that are served: who is refused takes nobody's place
 };
 
 // Counted as served before draining is looked at, so that whoever drains and then sees none can be

@@ -53,9 +53,9 @@ class GrpcServer {
   // Health turns to NOT_SERVING, then nobody can connect any more and new calls are refused with
   // UNAVAILABLE; calls under way go on. Socket files are removed.
   void BeginDrain();
-  // Whether no call is under way.
+  // Whether no call is under way but those that are refused.
   [[nodiscard]] bool idle() const;
-  // Of one RPC.
+  // All that are under way of one RPC.
   [[nodiscard]] int calls(Rpc rpc) const;
   [[nodiscard]] ConnectionCounts connections() const;
   // Calls that ever began.

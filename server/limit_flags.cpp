@@ -9,6 +9,24 @@
 #include "renderer/scene.h"
 
 namespace halflight {
+namespace {
+
+// CLI11 2.1 takes 010 for eight, -1 for the largest number there is, and larger ones for that too.
+bool IsDecimal(const std::string& text) {
+  constexpr size_t kMostDigits = 19;  // of what 64 bits hold
+  return !text.empty() && text.size() <= kMostDigits &&
+         text.find_first_not_of("0123456789") == std::string::npos &&
+         (text.size() == 1 || text[0] != '0');
+}
+
+}  // namespace
+
+CLI::Validator DecimalNumber() {
+  return {[](const std::string& text) {
+            return IsDecimal(text) ? "" : text + ", allowed: a whole number from 0 on";
+          },
+          ""};
+}
 
 void AddLimitFlags(CLI::App& app, Options& options) {
   CLI::Option* const cache_dir =
@@ -18,29 +36,21 @@ void AddLimitFlags(CLI::App& app, Options& options) {
           ->type_name("DIRECTORY");
 
   ServerLimits& limits = options.limits;
-  // CLI11 2.1 takes -1 for the largest number there is, and 010 for 8.
-  const CLI::Validator decimal(
-      [](const std::string& text) {
-        const bool ok = !text.empty() &&
-                        text.find_first_not_of("0123456789") == std::string::npos &&
-                        (text.size() == 1 || text[0] != '0');
-        return ok ? "" : text + ", allowed: a whole number from 0 on";
-      },
-      "");
+  const CLI::Validator decimal = DecimalNumber();
   const auto number = [&](const std::string& flag, auto& value, const std::string& help) {
     app.add_option(flag, value, help)->capture_default_str()->check(decimal)->group("Limits");
   };
-  // The conversion of sizes takes -1 for the largest number there is.
-  const CLI::Validator not_negative(
+  const CLI::Validator size(
       [](const std::string& text) {
-        return text.find('-') == std::string::npos ? "" : text + ", allowed: a size from 0 on";
+        const std::string digits = text.substr(0, text.find_first_not_of("0123456789"));
+        return IsDecimal(digits) ? "" : text + ", allowed: a size from 0 on";
       },
       "");
   const auto bytes = [&](const std::string& flag, uint64_t& value, const std::string& help) {
     return app.add_option(flag, value, help + "; takes suffixes such as 64MiB")
         ->capture_default_str()
         ->transform(CLI::AsSizeValue(false))
-        ->transform(not_negative)  // the last one added looks first
+        ->transform(size)  // the last one added looks first
         ->group("Limits");
   };
   number("--max-particles", limits.max_particles, "Particles of one set");

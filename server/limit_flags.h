@@ -8,6 +8,9 @@
 
 namespace halflight {
 
+// For flags of whole numbers: what else there is than digits is refused.
+CLI::Validator DecimalNumber();
+
 // Those of ServerLimits, and what else there is a limit on.
 void AddLimitFlags(CLI::App& app, Options& options);
 

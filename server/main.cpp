@@ -53,10 +53,10 @@ sigset_t BlockTerminationSignals() {
   return signals;
 }
 
-// `log`: it is started, and has nothing but JSON.
-int Fail(int code, const absl::Status& status, bool log = false) {
-  if (log) {
-    Log(LogLevel::kError, "cannot_start", {{"message", std::string(status.message())}});
+// In the log where that is to be JSON, and nothing else.
+int Fail(int code, const absl::Status& status, const Options& options) {
+  if (options.log_format == LogFormat::kJson && options.log_level != "off") {
+    Log(LogLevel::kError, "cannot_start", {{"message", MessageOf(status)}});
   } else {
     std::cerr << "halflightd: " << status.message() << "\n";
   }
@@ -85,9 +85,8 @@ int Run(const Options& options, std::vector<ListeningSocket> inherited, const si
   std::optional<TerminationWatch> watch(
       std::in_place, signals, std::nullopt,
       ImmediateEnd{EXIT_SUCCESS, "stopped", "told so while it was starting"});
-  const bool json = options.log_format == LogFormat::kJson && options.log_level != "off";
-  const auto fail = [json](int code, const absl::Status& status) {
-    return Fail(code, status, json);
+  const auto fail = [&options](int code, const absl::Status& status) {
+    return Fail(code, status, options);
   };
   // What can be wrong with flags and files shows before the device is started.
   const auto access = Access::Load(options.access);
@@ -136,9 +135,9 @@ int Run(const Options& options, std::vector<ListeningSocket> inherited, const si
   ServerLimits limits = LimitsOnDevice(options.limits, device);
   limits.max_connections = std::min(limits.max_connections, RoomForConnections());
   if (limits.max_connections < options.limits.max_connections) {
-    limits.max_client_connections = static_cast<uint32_t>(
-        std::max(uint64_t{1}, uint64_t{limits.max_client_connections} * limits.max_connections /
-                                  options.limits.max_connections));
+    const bool shared = limits.max_client_connections < options.limits.max_connections;
+    const uint32_t most = limits.max_connections - (shared ? limits.max_connections / 4 : 0);
+    limits.max_client_connections = std::min(limits.max_client_connections, most);
     Log(LogLevel::kWarn, "fewer_connections",
         {{"max", limits.max_connections},
          {"message", "than --max-connections, for want of open files"}});
@@ -203,7 +202,7 @@ int Run(const Options& options, std::vector<ListeningSocket> inherited, const si
 int main(int argc, char** argv) {
   const auto options = ParseOptions(argc, argv, std::cout);
   if (!options.ok()) {
-    return Fail(kExitBadFlags, options.status());
+    return Fail(kExitBadFlags, options.status(), {});
   }
   if (!options->has_value()) {
     return EXIT_SUCCESS;
@@ -213,12 +212,12 @@ int main(int argc, char** argv) {
   // the end of the server.
   signal(SIGXFSZ, SIG_IGN);
   signal(SIGPIPE, SIG_IGN);
-  auto inherited = TakeInheritedSockets();
-  if (!inherited.ok()) {
-    return Fail(kExitCannotStart, inherited.status());
-  }
   // Before any thread is made: all of them inherit the mask.
   const sigset_t signals = BlockTerminationSignals();
   StartLog((*options)->log_level, (*options)->log_format);
+  auto inherited = TakeInheritedSockets();
+  if (!inherited.ok()) {
+    return Fail(kExitCannotStart, inherited.status(), **options);
+  }
   return Run(**options, *std::move(inherited), signals);
 }

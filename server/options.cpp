@@ -37,14 +37,17 @@ void AddFlags(CLI::App& app, Options& options) {
                  "drm:<path>")
       ->capture_default_str();
   app.add_option("--encode-threads", options.encode_threads,
-                 "Threads that encode images; 0: one for each core but one");
+                 "Threads that encode images; 0: one for each core but one")
+      ->check(DecimalNumber());
   app.add_option("--drain-seconds", options.drain_seconds,
                  "How long what runs may go on after SIGTERM")
-      ->capture_default_str();
+      ->capture_default_str()
+      ->check(DecimalNumber());
   app.add_option("--watchdog-seconds", options.watchdog_seconds,
                  "How long the device may not come back from a frame that was cancelled or took "
                  "too long before halflightd ends with exit code 4; 0: for ever")
-      ->capture_default_str();
+      ->capture_default_str()
+      ->check(DecimalNumber());
   // For tests, so not listed: drawings that shall find the device failing.
   app.add_option_function<std::string>(
          "--plan-device-faults",

@@ -176,7 +176,11 @@ bool ParticleFiles::Use(const std::string& sha256) {
 uint64_t ParticleFiles::LeastMemoryBytes(const std::string& sha256) const {
   const std::lock_guard lock(mutex_);
   const auto found = by_name_.find(sha256);
-  return found == by_name_.end() ? 0 : found->second->bytes - kBlock;
+  if (found == by_name_.end()) {
+    return 0;
+  }
+  const uint64_t file = found->second->bytes;
+  return file - std::min(file, 2 * kBlock);  // what stands before the values is in one more
 }
 
 void ParticleFiles::SetTime(const std::string& sha256) {

@@ -66,9 +66,12 @@ bool ParticleStore::OnDiskOnly(const std::string& sha256) {
 
 void ParticleStore::Fetch(const std::string& sha256, std::stop_token stop,
                           std::function<void(const absl::Status&)> then) {
-  if (absl::Status room = CheckRoom(files_->LeastMemoryBytes(sha256)); !room.ok()) {
-    then(room);
-    return;
+  // A file that could never be taken is looked at, which finds that out for good.
+  if (const uint64_t bytes = files_->LeastMemoryBytes(sha256); bytes <= max_bytes_) {
+    if (absl::Status room = CheckRoom(bytes); !room.ok()) {
+      then(room);
+      return;
+    }
   }
   files_->Read(sha256, std::move(stop), [this, sha256, then = std::move(then)](const auto& set) {
     const bool read = set.ok() && *set != nullptr;

@@ -33,7 +33,7 @@ class RenderService {
   // From now on new calls are refused with UNAVAILABLE, and no more is read of sequences; frames
   // under way go on.
   void BeginDrain();
-  // Calls under way.
+  // Calls under way: those that are not refused, and all of one RPC.
   [[nodiscard]] int served_calls() const;
   [[nodiscard]] int active_calls(Rpc rpc) const;
   // All that ever began.

@@ -13,19 +13,22 @@
 namespace halflight {
 namespace {
 
-// Where it cannot be told, as of a server that we may not talk to, somebody does.
-bool SomebodyListens(const std::string& path) {
+// Why there may be a server: one that we may not talk to, for one. Empty where there is none.
+std::string WhyNotDead(const std::string& path) {
   sockaddr_un address{};
   address.sun_family = AF_UNIX;
   path.copy(address.sun_path, sizeof(address.sun_path) - 1);
   const int probe = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
   if (probe < 0) {
-    return true;
+    return std::strerror(errno);
   }
   const int connected = connect(probe, reinterpret_cast<sockaddr*>(&address), sizeof(address));
-  const bool listens = connected == 0 || errno != ECONNREFUSED;
+  const int error = connected == 0 ? 0 : errno;
   close(probe);
-  return listens;
+  // A full backlog, too, means that somebody is there.
+  return error == ECONNREFUSED           ? ""
+         : error == 0 || error == EAGAIN ? "it answers"
+                                         : std::strerror(error);
 }
 
 }  // namespace
@@ -43,8 +46,8 @@ absl::Status RemoveStaleSocket(const std::string& path) {
   if (!S_ISSOCK(info.st_mode)) {
     return absl::AlreadyExistsError(fmt::format("{} exists and is not a socket", path));
   }
-  if (SomebodyListens(path)) {
-    return absl::AlreadyExistsError(fmt::format("another server listens on {}", path));
+  if (const std::string why = WhyNotDead(path); !why.empty()) {
+    return absl::AlreadyExistsError(fmt::format("another server listens on {}: {}", path, why));
   }
   unlink(path.c_str());
   return absl::OkStatus();

@@ -11,16 +11,17 @@ namespace halflight {
 // Any thread.
 class LogBudget {
  public:
+  using Clock = std::chrono::steady_clock;
+
   // So many lines of a kind in ten seconds.
   explicit LogBudget(int lines) : lines_(lines) {}
 
   // How many there were since the last one that was written, this one among them; none where this
   // one is not to be written.
-  std::optional<uint64_t> Take() {
+  std::optional<uint64_t> Take(Clock::time_point now = Clock::now()) {
     constexpr std::chrono::seconds kInterval{10};
     const std::lock_guard lock(mutex_);
     ++since_last_told_;
-    const auto now = std::chrono::steady_clock::now();
     if (!begun_.has_value() || now - *begun_ >= kInterval) {
       begun_ = now;
       written_ = 0;
@@ -37,7 +38,7 @@ class LogBudget {
  private:
   const int lines_;
   std::mutex mutex_;
-  std::optional<std::chrono::steady_clock::time_point> begun_;
+  std::optional<Clock::time_point> begun_;
   int written_ = 0;
   uint64_t since_last_told_ = 0;
 };

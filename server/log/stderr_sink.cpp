@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <string>
+#include <string_view>
 
 #include <poll.h>
 #include <unistd.h>
@@ -28,26 +29,32 @@ void DroppingSink::sink_it_(const spdlog::details::log_msg& message) {
   }
 }
 
-// False where not all of it was.
+// False where not all of it was. What follows part of a line begins one of its own.
 bool DroppingSink::Write(const spdlog::details::log_msg& message) {
   spdlog::memory_buf_t line;
   formatter_->format(message, line);
-  for (size_t at = 0; at < line.size();) {
+  std::string_view left(line.data(), line.size());
+  const std::string after_torn = "\n" + std::string(left);
+  if (torn_) {
+    left = after_torn;
+  }
+  while (!left.empty()) {
     if (!HasRoom()) {
       return false;
     }
-    const ssize_t wrote = write(fd_, line.data() + at, std::min(line.size() - at, kPiece));
+    const ssize_t wrote = write(fd_, left.data(), std::min(left.size(), kPiece));
     if (wrote < 0 && errno != EINTR) {
-      return errno != EAGAIN;  // else nobody will ever read it
+      return errno == EPIPE;  // nobody will ever read it, so none is missed
     }
-    at += static_cast<size_t>(std::max<ssize_t>(wrote, 0));
+    left.remove_prefix(static_cast<size_t>(std::max<ssize_t>(wrote, 0)));
+    torn_ = !left.empty() && (torn_ || wrote > 0);
   }
   return true;
 }
 
 bool DroppingSink::HasRoom() const {
   pollfd polled{.fd = fd_, .events = POLLOUT, .revents = 0};
-  return poll(&polled, 1, dropped_ == 0 ? kPatienceMs : 0) != 0;
+  return poll(&polled, 1, dropped_ == 0 ? kPatienceMs : 0) > 0;
 }
 
 }  // namespace halflight

@@ -4,7 +4,7 @@
 
 #include <cstdint>
 #include <mutex>
-#include <string_view>
+#include <string>
 
 #include <spdlog/sinks/base_sink.h>
 
@@ -30,6 +30,7 @@ class DroppingSink final : public spdlog::sinks::base_sink<std::mutex> {
   const int fd_;
   const Notice notice_;
   uint64_t dropped_ = 0;  // since the last line
+  bool torn_ = false;     // of which only a part was written
 };
 
 }  // namespace halflight

@@ -23,6 +23,7 @@ using Clock = std::chrono::steady_clock;
 constexpr uint32_t kMaxConnections = 16;
 constexpr int kThreads = 2;
 constexpr size_t kMaxRequestBytes = 8192;
+constexpr std::chrono::seconds kLeastToSend{1};  // who waited for others has little time left
 
 // False where nothing happens until then, or the peer is gone.
 bool WaitFor(int fd, short event, Clock::time_point until) {
@@ -115,7 +116,8 @@ class Server final : public MetricsServer {
  private:
   void Serve(int fd, Clock::time_point until) {
     if (const std::string head = ReadHead(fd, until); !head.empty()) {
-      Send(fd, AnswerTo(head, page_), until);
+      const std::string answer = AnswerTo(head, page_);
+      Send(fd, answer, std::max(until, Clock::now() + kLeastToSend));
     }
   }
 

@@ -522,6 +522,7 @@ TEST_F(Sequence, FrameWhoseSetFindsNoRoomBesideThatOfTheFrameBeforeWaitsForIt) {
   ASSERT_TRUE(WaitFor([&] { return sink.reads() == 2; }));
   handler->OnRequest(Wrap(requests[1]));
   EXPECT_FALSE(sink.finished().has_value());
+  EXPECT_EQ(store.state().disk_reads, 1U) << "there is no room for the other";
   // The engine of this test remembers its last request.
   ASSERT_TRUE(engine_.Submit({}, {}, [](const auto&) {}).ok());
   engine_.SetGate(true);

@@ -231,7 +231,10 @@ TEST(Options, ErrorsNameFlagValueAndWhatIsAllowed) {
     EXPECT_THAT(ErrorOf({"--max-queued-frames", wrong}),
                 HasSubstr("--max-queued-frames: " + std::string(wrong) + ", allowed: "));
     EXPECT_THAT(ErrorOf({"--max-reference-work", wrong}), HasSubstr("--max-reference-work: "));
+    EXPECT_THAT(ErrorOf({"--drain-seconds", wrong}), HasSubstr("--drain-seconds: "));
   }
+  EXPECT_THAT(ErrorOf({"--max-reference-work", "18446744073709551616"}), HasSubstr("allowed: "));
+  EXPECT_THAT(ErrorOf({"--max-cache-bytes", "010MiB"}), HasSubstr("--max-cache-bytes: 010MiB"));
   EXPECT_THAT(ErrorOf({"--max-cache-bytes", "1MiB", "--max-particle-bytes", "2MiB"}),
               HasSubstr("--max-cache-bytes: 1048576, allowed: at least --max-particle-bytes"));
   EXPECT_THAT(

@@ -478,6 +478,21 @@ TEST_F(StoreOnDisk, SetInUseKeepsItsRoomFromThoseOnDisk) {
   ExpectSame(Fetch(store, two.sha256), two);
 }
 
+// Else its clients would be told for ever that it is here, and to come back.
+TEST_F(StoreOnDisk, FileThatCanNeverBeTakenIsAMissingSetHoweverLittleRoomThereIs) {
+  const NamedParticles set = SetOf(7);
+  for (const std::string& bytes : {std::string(), std::string(1 << 20, 'x')}) {
+    fs::create_directory(path_);
+    std::ofstream(PathOf(set.sha256)) << bytes;
+    ParticleStore store(150 * kBytesEach, Open());
+    const NamedParticles one = SetOf(100);
+    EXPECT_TRUE(store.Insert(one.sha256, one.set).ok()) << "and it stays in use";
+    ASSERT_TRUE(store.OnDiskOnly(set.sha256));
+    EXPECT_EQ(Fetch(store, set.sha256), nullptr);
+    EXPECT_FALSE(store.Touch(set.sha256));
+  }
+}
+
 TEST_F(StoreOnDisk, UseInMemoryKeepsTheFile) {
   limits_.max_cache_dir_bytes = 2 * 4096;
   ParticleStore store(1 << 20, Open());

@@ -9,7 +9,6 @@
 #include <unistd.h>
 
 #include <fmt/format.h>
-#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <spdlog/logger.h>
 
@@ -17,8 +16,6 @@
 
 namespace halflight {
 namespace {
-
-using ::testing::HasSubstr;
 
 class DroppingSinkTest : public ::testing::Test {
  protected:
@@ -74,6 +71,21 @@ TEST_F(DroppingSinkTest, DropsWhatNobodyReadsAndSaysHowMuchThatWas) {
   EXPECT_EQ(Read(), "and on\n");
 }
 
+TEST_F(DroppingSinkTest, LinesAreLinesAlsoAfterOneThatWasTorn) {
+  // With its end three pages; a pipe holds sixteen.
+  const std::string line(3 * 4096 - 1, 'x');
+  for (int i = 0; i < 6; ++i) {
+    logger_->info(line);
+  }
+  const std::string before = Read();
+  ASSERT_FALSE(before.empty());
+  ASSERT_NE(before.back(), '\n') << "the last one is torn";
+  logger_->info("again");
+  const std::string after = Read();
+  EXPECT_EQ(after.substr(0, 9), "\ndropped ");
+  EXPECT_EQ(after.substr(after.size() - 7), "\nagain\n");
+}
+
 TEST_F(DroppingSinkTest, GoesOnWhereTheReaderIsGone) {
   signal(SIGPIPE, SIG_IGN);
   CloseReader();
@@ -84,9 +96,15 @@ TEST_F(DroppingSinkTest, GoesOnWhereTheReaderIsGone) {
 
 TEST(LogBudget, CountsWhatIsNotWritten) {
   LogBudget budget(2);
-  EXPECT_EQ(budget.Take(), 1U);
-  EXPECT_EQ(budget.Take(), 1U);
-  EXPECT_EQ(budget.Take(), std::nullopt);
+  const auto begin = LogBudget::Clock::now();
+  const auto after = [&](int seconds) { return begin + std::chrono::seconds(seconds); };
+  EXPECT_EQ(budget.Take(begin), 1U);
+  EXPECT_EQ(budget.Take(after(1)), 1U);
+  EXPECT_EQ(budget.Take(after(2)), std::nullopt);
+  EXPECT_EQ(budget.Take(after(9)), std::nullopt);
+  EXPECT_EQ(budget.Take(after(10)), 3U);
+  EXPECT_EQ(budget.Take(after(11)), 1U);
+  EXPECT_EQ(budget.Take(after(12)), std::nullopt);
 }
 
 }  // namespace
