@@ -132,10 +132,11 @@ Camera ConvertCamera(const v1::Camera& camera, int supersample, const ServerLimi
 
   const Interval sizes{
       .low = 1.0, .high = static_cast<double>(limits.max_image_size), .server_limit = true};
-  const uint32_t width =
-      checks.InRangeOr("scene.camera.width", camera.width(), kDefaultWidth, sizes);
-  const uint32_t height =
-      checks.InRangeOr("scene.camera.height", camera.height(), kDefaultHeight, sizes);
+  // What stands for one that is unset is not allowed everywhere either.
+  const uint32_t width = checks.InRange(
+      "scene.camera.width", camera.width() == 0 ? kDefaultWidth : camera.width(), sizes);
+  const uint32_t height = checks.InRange(
+      "scene.camera.height", camera.height() == 0 ? kDefaultHeight : camera.height(), sizes);
   converted.width = static_cast<int>(width);
   converted.height = static_cast<int>(height);
   converted.window = ConvertWindow(camera, width, height, checks);

@@ -679,10 +679,12 @@ TEST_F(Sequence, CancelledWhileItsParticlesAreReadEndsOnce) {
   const OnDisk disk(limits_);
   Backend backend{engine_.device(), limits_, version_, *disk.store, partial_uploads_, pipeline_};
   handler_ = std::make_shared<RenderSequenceHandler>(backend, sink_);
+  engine_.SetGate(false);  // however late it is cancelled, nothing is written yet
   handler_->Start();
   handler_->OnRequest(Wrap(disk.Request()));
   handler_->OnCancel();
   EXPECT_EQ(sink_.WaitForFinish().code(), absl::StatusCode::kCancelled);
+  engine_.SetGate(true);
 }
 
 TEST_F(Sequence, ErrorNamesItsFrameAfterAllFramesBeforeIt) {

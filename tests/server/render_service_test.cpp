@@ -200,7 +200,7 @@ TEST_F(StrictService, ReaderThatTakesTooLittleLosesItsCallHoweverSteady) {
   auto reader = stub_->RenderFrame(&context, LargeRequest());
   v1::RenderFrameResponse response;
   while (reader->Read(&response)) {
-    std::this_thread::sleep_for(std::chrono::milliseconds(200));
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
   }
   EXPECT_EQ(reader->Finish().error_code(), grpc::StatusCode::CANCELLED);
 }

@@ -584,6 +584,20 @@ TEST(Validation, UnknownSetIsNotFoundByItsHexadecimalName) {
   EXPECT_THAT(std::string(job.status().message()), ::testing::HasSubstr("abababab"));
 }
 
+// Found by fuzzing: with a crop the rest of the picture was held to nothing.
+TEST(Validation, SizeThatIsUnsetIsHeldToTheLimitToo) {
+  Request request = MakeRequest();
+  CameraOf(request).clear_width();
+  CameraOf(request).mutable_crop()->set_width(8);
+  CameraOf(request).mutable_crop()->set_height(8);
+  ParticleStore store(1 << 20);
+  ServerLimits limits;
+  limits.max_image_size = 128;
+  const auto job = ConvertRequest(request, store, limits, {});
+  EXPECT_THAT(std::string(job.status().message()),
+              StartsWith("scene.camera.width: 640, allowed: [1, 128]"));
+}
+
 TEST(Validation, TooManyParticlesAreRefusedForGood) {
   Request request = MakeRequest();
   ParticleStore store(1 << 20);
