@@ -164,10 +164,10 @@ void RunConnections(Run& run) {
   for (const auto& reader : readers) {
     reader->Wait();
   }
-  const double descriptors = static_cast<double>(server.Count("fd")) - descriptors_before;
+  const double open = server.Metric("halflight_connections").value_or(0.0);
 
   run.report.AtLeast("clients connected", connected + slow, clients, "");
-  run.report.AtLeast("connections open at the server", descriptors, clients, "");
+  run.report.AtLeast("connections open at the server", open, clients, "");
   run.report.Tell("frames held unread at once, at most", static_cast<double>(most_at_once), "");
   run.report.Tell("refused until others were ended", refused, "");
   run.report.AtLeast("slow readers ended by the server after their frame began",
