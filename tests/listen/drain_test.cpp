@@ -50,7 +50,7 @@ TEST(Drain, SaysSoThenRefusesConnectionsAndCallsThenFinishesWhatRuns) {
   EXPECT_EQ(watch.Next(), kNotServing);
   EXPECT_EQ(Health(balancer), kNotServing);
   EXPECT_TRUE(WaitFor([&] { return !ClientSocket().Connect(address); }));
-  EXPECT_FALSE(std::filesystem::exists(folder / "socket"));
+  EXPECT_TRUE(WaitFor([&] { return !std::filesystem::exists(folder / "socket"); }));
   EXPECT_EQ(client->GetServerInfo().status().code(), absl::StatusCode::kUnavailable);
   EXPECT_EQ(Health(balancer), kNotServing);
 
