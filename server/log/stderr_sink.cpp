@@ -32,12 +32,11 @@ void DroppingSink::sink_it_(const spdlog::details::log_msg& message) {
 // False where not all of it was. What follows part of a line begins one of its own.
 bool DroppingSink::Write(const spdlog::details::log_msg& message) {
   spdlog::memory_buf_t line;
-  formatter_->format(message, line);
-  std::string_view left(line.data(), line.size());
-  const std::string after_torn = "\n" + std::string(left);
   if (torn_) {
-    left = after_torn;
+    line.push_back('\n');
   }
+  formatter_->format(message, line);  // behind what is there
+  std::string_view left(line.data(), line.size());
   while (!left.empty()) {
     if (!HasRoom()) {
       return false;

@@ -17,6 +17,14 @@ struct Answer {
   std::string bytes;
 };
 
+// The bytes of a message; none where it has none that can be read.
+inline std::string BytesOf(const grpc::ByteBuffer& message) {
+  grpc::Slice whole;
+  return message.DumpToSingleSlice(&whole).ok()
+             ? std::string(reinterpret_cast<const char*>(whole.begin()), whole.size())
+             : "";
+}
+
 // Calls a method with the bytes of one message.
 inline Answer CallRaw(const std::shared_ptr<grpc::Channel>& channel, const std::string& method,
                       const std::string& request,
@@ -34,9 +42,8 @@ inline Answer CallRaw(const std::shared_ptr<grpc::Channel>& channel, const std::
   void* tag = nullptr;
   bool ok = false;
   queue.Next(&tag, &ok);
-  grpc::Slice whole;
-  if (answer.status.ok() && bytes.DumpToSingleSlice(&whole).ok()) {
-    answer.bytes.assign(reinterpret_cast<const char*>(whole.begin()), whole.size());
+  if (answer.status.ok()) {
+    answer.bytes = BytesOf(bytes);
   }
   return answer;
 }
@@ -78,10 +85,7 @@ class HealthWatch {
   std::string Next() {
     grpc::ByteBuffer bytes;
     call_->Read(&bytes, nullptr);
-    grpc::Slice whole;
-    return Wait() && bytes.DumpToSingleSlice(&whole).ok()
-               ? std::string(reinterpret_cast<const char*>(whole.begin()), whole.size())
-               : "";
+    return Wait() ? BytesOf(bytes) : "";
   }
 
  private:

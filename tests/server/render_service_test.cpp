@@ -92,6 +92,15 @@ class Service : public ::testing::Test {
     return reader->Finish();
   }
 
+  // Two clients' frames, which are drawn once the engine's gate is opened.
+  void HoldTwoFrames() {
+    engine_.SetGate(false);
+    for (int i = 0; i < 2; ++i) {
+      held_.emplace_back([this] { EXPECT_TRUE(RenderAll(MakeRequest()).ok()); });
+    }
+    ASSERT_TRUE(WaitFor([this] { return pipeline_.queued() == 2; }));
+  }
+
   FakeEngine engine_;
   ServerLimits limits_;
   std::string version_ = "1.2.3";
@@ -104,6 +113,7 @@ class Service : public ::testing::Test {
   std::unique_ptr<GrpcServer> server_;
   std::shared_ptr<grpc::Channel> channel_;
   std::unique_ptr<v1::RenderService::Stub> stub_;
+  std::vector<std::jthread> held_;  // last: they use all of the above
 };
 
 TEST_F(Service, FrameBytesMatchTheTrailer) {
@@ -158,12 +168,7 @@ TEST_F(Service, DeadlineStopsAFrameThatWaits) {
 }
 
 TEST_F(Service, FullQueueSaysWhenToRetry) {
-  engine_.SetGate(false);
-  std::vector<std::jthread> clients;
-  for (int i = 0; i < 2; ++i) {
-    clients.emplace_back([this] { EXPECT_TRUE(RenderAll(MakeRequest()).ok()); });
-  }
-  ASSERT_TRUE(WaitFor([this] { return pipeline_.queued() == 2; }));
+  ASSERT_NO_FATAL_FAILURE(HoldTwoFrames());
   grpc::ClientContext context;
   auto reader = stub_->RenderFrame(&context, MakeRequest());
   v1::RenderFrameResponse response;
@@ -244,12 +249,7 @@ TEST_F(ImpatientService, SequenceMayWaitForItsNextRequestAsLongAsItLikes) {
 }
 
 TEST_F(ImpatientService, CallsBeyondTheLimitAreToldToComeBack) {
-  engine_.SetGate(false);
-  std::vector<std::jthread> clients;
-  for (int i = 0; i < 2; ++i) {
-    clients.emplace_back([this] { EXPECT_TRUE(RenderAll(MakeRequest()).ok()); });
-  }
-  ASSERT_TRUE(WaitFor([this] { return pipeline_.queued() == 2; }));
+  ASSERT_NO_FATAL_FAILURE(HoldTwoFrames());
   grpc::ClientContext context;
   v1::GetServerInfoResponse info;
   const grpc::Status status = stub_->GetServerInfo(&context, {}, &info);
@@ -265,12 +265,7 @@ class NarrowService : public Service {
 };
 
 TEST_F(NarrowService, CallsOfOneConnectionBeyondTheLimitWaitForOthersToEnd) {
-  engine_.SetGate(false);
-  std::vector<std::jthread> clients;
-  for (int i = 0; i < 2; ++i) {
-    clients.emplace_back([this] { EXPECT_TRUE(RenderAll(MakeRequest()).ok()); });
-  }
-  ASSERT_TRUE(WaitFor([this] { return pipeline_.queued() == 2; }));
+  ASSERT_NO_FATAL_FAILURE(HoldTwoFrames());
   const auto ask = [this](std::chrono::milliseconds time) {
     grpc::ClientContext context;
     context.set_deadline(std::chrono::system_clock::now() + time);
