@@ -34,7 +34,11 @@ ParticleStore::~ParticleStore() = default;
 
 std::shared_ptr<const ParticleSet> ParticleStore::Find(const std::string& sha256) {
   auto set = Use(sha256);
-  ++(set != nullptr ? hits_ : misses_);
+  if (set != nullptr) {
+    ++hits_;
+  } else if (!OnDiskOnly(sha256)) {
+    ++misses_;
+  }
   return set;
 }
 

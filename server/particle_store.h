@@ -43,7 +43,8 @@ class ParticleStore {
   ParticleStore(ParticleStore&&) = delete;
   ParticleStore& operator=(ParticleStore&&) = delete;
 
-  // The set, which counts as used now; null where it is not in memory.
+  // The set, which counts as used now; null where it is not in memory. That is a miss where it is
+  // not on disk either: who looks for it has it read then, and looks again.
   std::shared_ptr<const ParticleSet> Find(const std::string& sha256);
 
   // The same again for a frame that has found it before: not counted as another lookup.

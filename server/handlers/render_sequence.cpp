@@ -56,19 +56,11 @@ void RenderSequenceHandler::Refuse(const absl::Status& status) {
 }
 
 // By the thread that advances, and nobody else touches the frame that waits meanwhile: hands it to
-// the pipeline, or has its set read from disk first, which others may push out of memory at any
-// time.
+// the pipeline. Where its set is on disk alone, at first or because others pushed it out of memory,
+// it is read first.
 void RenderSequenceHandler::Submit() {
   const std::string sha256 = state_.SetWanted(waiting_->request.scene());
   std::unique_lock lock(mutex_);
-  if (backend_.store.OnDiskOnly(sha256)) {
-    fetching_ = true;
-    lock.unlock();
-    backend_.store.Fetch(
-        sha256, stop_.get_token(),
-        [self = shared_from_this()](const absl::Status& fetched) { self->OnFetched(fetched); });
-    return;
-  }
   const std::shared_ptr<Slot> slot = slots_.back();
   lock.unlock();
   const absl::Status status = SubmitNow(slot);
@@ -76,7 +68,11 @@ void RenderSequenceHandler::Submit() {
   if (status.ok()) {
     waiting_.reset();
   } else if (absl::IsNotFound(status) && backend_.store.OnDiskOnly(sha256)) {
-    may_submit_ = true;
+    fetching_ = true;
+    lock.unlock();
+    backend_.store.Fetch(
+        sha256, stop_.get_token(),
+        [self = shared_from_this()](const absl::Status& fetched) { self->OnFetched(fetched); });
   } else if (waiting_->job.has_value()) {
     WaitOrRefuse(status);
   } else {
