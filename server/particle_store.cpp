@@ -36,7 +36,7 @@ std::shared_ptr<const ParticleSet> ParticleStore::Find(const std::string& sha256
   auto set = Use(sha256);
   if (set != nullptr) {
     ++hits_;
-  } else if (!OnDiskOnly(sha256)) {
+  } else if (files_ == nullptr || !files_->Use(sha256)) {
     ++misses_;
   }
   return set;
@@ -64,12 +64,12 @@ bool ParticleStore::InMemory(const std::string& sha256) const {
   return by_name_.find(sha256) != by_name_.end();
 }
 
-bool ParticleStore::OnDiskOnly(const std::string& sha256) {
-  return files_ != nullptr && !InMemory(sha256) && files_->Use(sha256);
-}
-
 void ParticleStore::Fetch(const std::string& sha256, std::stop_token stop,
                           std::function<void(const absl::Status&)> then) {
+  if (InMemory(sha256) || files_ == nullptr) {
+    then(absl::OkStatus());
+    return;
+  }
   // A file that could never be taken is looked at, which finds that out for good.
   if (const uint64_t bytes = files_->LeastMemoryBytes(sha256); bytes <= max_bytes_) {
     if (absl::Status room = CheckRoom(bytes); !room.ok()) {

@@ -43,8 +43,8 @@ class ParticleStore {
   ParticleStore(ParticleStore&&) = delete;
   ParticleStore& operator=(ParticleStore&&) = delete;
 
-  // The set, which counts as used now; null where it is not in memory. That is a miss where it is
-  // not on disk either: who looks for it has it read then, and looks again.
+  // The set, which counts as used now; null where it is not in memory. Who looks for one that is on
+  // disk fetches it and looks again, so that is neither a hit nor a miss.
   std::shared_ptr<const ParticleSet> Find(const std::string& sha256);
 
   // The same again for a frame that has found it before: not counted as another lookup.
@@ -54,14 +54,11 @@ class ParticleStore {
   // is about to use.
   bool Touch(const std::string& sha256);
 
-  // Whether Find would find the set only after Fetch.
-  [[nodiscard]] bool OnDiskOnly(const std::string& sha256);
-
   // Reads the set from disk into memory, on another thread, which then calls `then`: with OK also
   // where the file turned out to be damaged or gone, and where `stop` was requested before it was
   // read; Unavailable, with reason and retry hint, where its file cannot be opened just now. Where
-  // it finds no room `then` has the error of Insert, at once if that can be told before it is read.
-  // Only where there is a cache directory.
+  // it finds no room `then` has the error of Insert. At once where nothing needs to be read: it is
+  // in memory, there is no cache directory, or that there is no room can be told before.
   void Fetch(const std::string& sha256, std::stop_token stop,
              std::function<void(const absl::Status&)> then);
 
@@ -76,7 +73,7 @@ class ParticleStore {
   struct State {
     uint64_t bytes = 0;  // in memory
     uint64_t sets = 0;
-    uint64_t hits = 0;  // what Find has come to so far
+    uint64_t hits = 0;  // of Find so far
     uint64_t misses = 0;
     uint64_t disk_bytes = 0;  // in the cache directory
     uint64_t disk_sets = 0;

@@ -9,16 +9,7 @@ namespace halflight {
 
 void RenderFrameHandler::Start(const v1::RenderFrameRequest& request) {
   // First: where more is asked for than can be drawn, refusing must cost little.
-  const absl::Status place = backend_.pipeline.PlaceFor(caller_.client());
-  const std::string& sha256 = request.scene().particle_sha256();
-  if (place.ok() && backend_.store.OnDiskOnly(sha256)) {
-    backend_.store.Fetch(sha256, stop_.get_token(),
-                         [self = shared_from_this(), request](const absl::Status& fetched) {
-                           self->Begin(request, fetched);
-                         });
-  } else {
-    Begin(request, place);
-  }
+  Begin(request, backend_.pipeline.PlaceFor(caller_.client()));
 }
 
 void RenderFrameHandler::Begin(const v1::RenderFrameRequest& request, absl::Status status) {
@@ -27,7 +18,13 @@ void RenderFrameHandler::Begin(const v1::RenderFrameRequest& request, absl::Stat
   } else if (status.ok()) {
     status = Submit(request);
   }
-  if (!status.ok()) {
+  const std::string& sha256 = request.scene().particle_sha256();
+  if (absl::IsNotFound(status) && backend_.store.Touch(sha256)) {
+    backend_.store.Fetch(sha256, stop_.get_token(),
+                         [self = shared_from_this(), request](const absl::Status& fetched) {
+                           self->Begin(request, fetched);
+                         });
+  } else if (!status.ok()) {
     backend_.metrics.OnFrameRefused(caller_.tenant, status.code());
     sink_.Finish(status);
   }

@@ -32,7 +32,7 @@ class RenderFrameHandler : public std::enable_shared_from_this<RenderFrameHandle
   void OnCancel() { stop_.request_stop(); }
 
  private:
-  // The particles are in memory or nowhere, or there is no room for them.
+  // With why it cannot. Again once the particles have been read from disk.
   void Begin(const v1::RenderFrameRequest& request, absl::Status status);
   absl::Status Submit(const v1::RenderFrameRequest& request);
   void OnFrame(const absl::StatusOr<std::shared_ptr<const EncodedFrame>>& frame);

@@ -57,7 +57,7 @@ void RenderSequenceHandler::Refuse(const absl::Status& status) {
 
 // By the thread that advances, and nobody else touches the frame that waits meanwhile: hands it to
 // the pipeline. Where its set is on disk alone, at first or because others pushed it out of memory,
-// it is read first.
+// that is read first.
 void RenderSequenceHandler::Submit() {
   const std::string sha256 = state_.SetWanted(waiting_->request.scene());
   std::unique_lock lock(mutex_);
@@ -67,7 +67,7 @@ void RenderSequenceHandler::Submit() {
   lock.lock();
   if (status.ok()) {
     waiting_.reset();
-  } else if (absl::IsNotFound(status) && backend_.store.OnDiskOnly(sha256)) {
+  } else if (absl::IsNotFound(status) && backend_.store.Touch(sha256)) {
     fetching_ = true;
     lock.unlock();
     backend_.store.Fetch(
@@ -103,7 +103,7 @@ absl::Status RenderSequenceHandler::SubmitNow(const std::shared_ptr<Slot>& slot)
                                   });
 }
 
-// The set of the frame that waits is in memory or nowhere, or there is no room for it.
+// The set of the frame that waits was read, or is nowhere, or there is no room for it.
 void RenderSequenceHandler::OnFetched(const absl::Status& fetched) {
   {
     const std::lock_guard lock(mutex_);

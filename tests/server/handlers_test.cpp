@@ -128,7 +128,8 @@ struct OnDisk {
     (*ParticleFiles::Open(folder / "cache", limits))->Write(sha256, particles->set);
     store =
         std::make_unique<ParticleStore>(1 << 20, *ParticleFiles::Open(folder / "cache", limits));
-    EXPECT_TRUE(store->OnDiskOnly(sha256));
+    EXPECT_TRUE(store->Touch(sha256));
+    EXPECT_EQ(store->state().sets, 0U);
   }
 
   [[nodiscard]] v1::RenderFrameRequest Request() const {
@@ -310,7 +311,7 @@ TEST_F(Handlers, WhereThereIsNoPlaceAFrameIsRefusedUnseenAndNothingIsReadForIt) 
     ASSERT_TRUE(sink.finished().has_value()) << "at once";
     EXPECT_EQ(DetailOf(*sink.finished()).reason, v1::ERROR_REASON_QUEUE_FULL) << *sink.finished();
   }
-  EXPECT_TRUE(disk.store->OnDiskOnly(disk.sha256));
+  EXPECT_EQ(disk.store->state().sets, 0U);
   engine_.SetGate(true);
   EXPECT_TRUE(first_sink.WaitForWrite());
   first->OnWritten(false);
@@ -488,7 +489,7 @@ TEST_F(Sequence, SetOfAFrameThatWaitsIsReadFromDiskWhereOthersPushedItOut) {
   ASSERT_TRUE(WaitFor([&] { return disk.store->Insert("others", others).ok(); }));
   others.reset();
   ASSERT_TRUE(WaitFor([&] { return disk.store->idle(); }));
-  ASSERT_TRUE(disk.store->OnDiskOnly(disk.sha256));
+  ASSERT_EQ(disk.store->Use(disk.sha256), nullptr);
   engine_.SetGate(true);
   for (int frames = 0; frames < 2;) {
     ASSERT_TRUE(sink.WaitForWrite()) << *sink.finished();
@@ -496,6 +497,7 @@ TEST_F(Sequence, SetOfAFrameThatWaitsIsReadFromDiskWhereOthersPushedItOut) {
     handler->OnWritten(true);
   }
   EXPECT_EQ(disk.store->state().disk_reads, 2U);
+  EXPECT_EQ(disk.store->state().misses, 0U) << "it was there all the time";
   handler->OnEndOfRequests();
   EXPECT_TRUE(sink.WaitForFinish().ok());
 }

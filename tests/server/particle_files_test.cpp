@@ -429,20 +429,28 @@ class StoreOnDisk : public Files {
   }
 };
 
+bool OnDiskAlone(ParticleStore& store, const std::string& sha256) {
+  return store.Use(sha256) == nullptr && store.Touch(sha256);
+}
+
 TEST_F(StoreOnDisk, SetDroppedFromMemoryComesBackFromDisk) {
   ParticleStore store(150 * kBytesEach, Open());
   const NamedParticles one = SetOf(100);
   const NamedParticles two = SetOf(101);
   EXPECT_TRUE(store.Insert(one.sha256, SetOf(100).set).ok());
-  EXPECT_FALSE(store.OnDiskOnly(one.sha256));
+  EXPECT_FALSE(OnDiskAlone(store, one.sha256));
   ASSERT_TRUE(WaitFor([&] { return store.Insert(two.sha256, SetOf(101).set).ok(); }));
   ASSERT_TRUE(WaitFor([&] { return store.idle(); }));
   EXPECT_EQ(store.Find(one.sha256), nullptr);
   EXPECT_TRUE(store.Touch(one.sha256));
-  EXPECT_TRUE(store.OnDiskOnly(one.sha256));
+  EXPECT_TRUE(OnDiskAlone(store, one.sha256));
   ExpectSame(Fetch(store, one.sha256), one);
-  EXPECT_FALSE(store.OnDiskOnly(one.sha256));
-  EXPECT_TRUE(store.OnDiskOnly(two.sha256));
+  EXPECT_FALSE(OnDiskAlone(store, one.sha256));
+  EXPECT_TRUE(OnDiskAlone(store, two.sha256));
+  EXPECT_EQ(store.state().disk_reads, 1U);
+  ExpectSame(Fetch(store, one.sha256), one);
+  EXPECT_EQ(store.state().disk_reads, 1U) << "it is in memory";
+  EXPECT_EQ(store.state().misses, 0U);
 }
 
 TEST_F(StoreOnDisk, SetsThatWaitForTheDiskAreNotDropped) {
@@ -487,7 +495,7 @@ TEST_F(StoreOnDisk, FileThatCanNeverBeTakenIsAMissingSetHoweverLittleRoomThereIs
     ParticleStore store(150 * kBytesEach, Open());
     const NamedParticles one = SetOf(100);
     EXPECT_TRUE(store.Insert(one.sha256, one.set).ok()) << "and it stays in use";
-    ASSERT_TRUE(store.OnDiskOnly(set.sha256));
+    ASSERT_TRUE(OnDiskAlone(store, set.sha256));
     EXPECT_EQ(Fetch(store, set.sha256), nullptr);
     EXPECT_FALSE(store.Touch(set.sha256));
   }
