@@ -56,11 +56,28 @@ std::vector<std::string> WithAddress(std::vector<std::string> flags, bool metric
   return flags;
 }
 
+// What the unit that is deployed sets: glibc reads how to keep memory there.
+std::vector<std::string> EnvironmentOfUnit() {
+  const std::string key = "Environment=";
+  std::vector<std::string> environment;
+  std::ifstream unit(HALFLIGHT_SYSTEMD_UNIT);
+  for (std::string line; std::getline(unit, line);) {
+    if (line.rfind(key, 0) == 0) {
+      environment.push_back(line.substr(key.size()));
+      Require(environment.back().find_first_of("\"' \\%") == std::string::npos,
+              "one variable a line, without quotes: " + line);
+    }
+  }
+  Require(!environment.empty(), "an environment in " HALFLIGHT_SYSTEMD_UNIT);
+  return environment;
+}
+
 }  // namespace
 
 Server::Server(const testing::Folder& folder, std::vector<std::string> flags,
                const std::string& program)
-    : Process(folder, program, WithAddress(std::move(flags), HasMetrics(program))),
+    : Process(folder, program, WithAddress(std::move(flags), HasMetrics(program)),
+              {.environment = EnvironmentOfUnit()}),
       address_(Address()) {
   metrics_address_ = AfterKey(Err(), "metrics address=");
 }

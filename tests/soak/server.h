@@ -18,7 +18,8 @@ namespace halflight::soak {
 
 class Server : public testing::Process {
  public:
-  // On a free port, with further flags. Waits until it listens.
+  // On a free port, with further flags and the environment of deploy/halflightd.service. Waits
+  // until it listens.
   Server(const testing::Folder& folder, std::vector<std::string> flags,
          const std::string& program = "halflightd");
 
