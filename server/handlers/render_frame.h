@@ -32,7 +32,7 @@ class RenderFrameHandler : public std::enable_shared_from_this<RenderFrameHandle
   void OnCancel() { stop_.request_stop(); }
 
  private:
-  // With why it cannot. Again once the particles have been read from disk.
+  // With whether there is a place for it, and again with what reading its particles came to.
   void Begin(const v1::RenderFrameRequest& request, absl::Status status);
   absl::Status Submit(const v1::RenderFrameRequest& request);
   void OnFrame(const absl::StatusOr<std::shared_ptr<const EncodedFrame>>& frame);
