@@ -23,6 +23,7 @@
 #include "tests/process/process.h"
 #include "tests/process/wait_for.h"
 #include "tests/server/fake_engine.h"
+#include "tests/server/on_disk.h"
 #include "tests/server/upload_messages.h"
 
 namespace halflight {
@@ -33,6 +34,7 @@ using testing::FakeEngine;
 using ::testing::HasSubstr;
 using testing::MakeParticles;
 using testing::MakeRequest;
+using testing::OnDiskAlone;
 using ::testing::StartsWith;
 using testing::WaitFor;
 
@@ -129,8 +131,7 @@ struct OnDisk {
     (*ParticleFiles::Open(folder / "cache", limits))->Write(sha256, particles->set);
     store =
         std::make_unique<ParticleStore>(1 << 20, *ParticleFiles::Open(folder / "cache", limits));
-    EXPECT_TRUE(store->Touch(sha256));
-    EXPECT_EQ(store->state().sets, 0U);
+    EXPECT_TRUE(OnDiskAlone(*store, sha256));
   }
 
   [[nodiscard]] v1::RenderFrameRequest Request() const {
@@ -312,7 +313,7 @@ TEST_F(Handlers, WhereThereIsNoPlaceAFrameIsRefusedUnseenAndNothingIsReadForIt) 
     ASSERT_TRUE(sink.finished().has_value()) << "at once";
     EXPECT_EQ(DetailOf(*sink.finished()).reason, v1::ERROR_REASON_QUEUE_FULL) << *sink.finished();
   }
-  EXPECT_EQ(disk.store->state().sets, 0U);
+  EXPECT_TRUE(OnDiskAlone(*disk.store, disk.sha256));
   engine_.SetGate(true);
   EXPECT_TRUE(first_sink.WaitForWrite());
   first->OnWritten(false);
@@ -490,7 +491,7 @@ TEST_F(Sequence, SetOfAFrameThatWaitsIsReadFromDiskWhereOthersPushedItOut) {
   ASSERT_TRUE(WaitFor([&] { return disk.store->Insert("others", others).ok(); }));
   others.reset();
   ASSERT_TRUE(WaitFor([&] { return disk.store->idle(); }));
-  ASSERT_EQ(disk.store->Use(disk.sha256), nullptr);
+  ASSERT_TRUE(OnDiskAlone(*disk.store, disk.sha256));
   engine_.SetGate(true);
   for (int frames = 0; frames < 2;) {
     ASSERT_TRUE(sink.WaitForWrite()) << *sink.finished();

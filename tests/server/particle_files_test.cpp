@@ -26,6 +26,7 @@
 #include "tests/process/wait_for.h"
 #include "tests/sanitizers.h"
 #include "tests/server/made_particles.h"
+#include "tests/server/on_disk.h"
 
 namespace halflight {
 namespace {
@@ -34,6 +35,7 @@ namespace fs = std::filesystem;
 using testing::Contents;
 using ::testing::HasSubstr;
 using testing::MakeParticles;
+using testing::OnDiskAlone;
 using testing::WaitFor;
 
 // Sets of different contents with every attribute.
@@ -428,10 +430,6 @@ class StoreOnDisk : public Files {
     return store.Find(sha256);
   }
 };
-
-bool OnDiskAlone(ParticleStore& store, const std::string& sha256) {
-  return store.Use(sha256) == nullptr && store.Touch(sha256);
-}
 
 TEST_F(StoreOnDisk, SetDroppedFromMemoryComesBackFromDisk) {
   ParticleStore store(150 * kBytesEach, Open());
